@@ -1,0 +1,1 @@
+"""The kinematic arm: the model file loaded, scaled and flattened for compiled code."""

@@ -1,0 +1,223 @@
+"""Vectors (x, y, z) and unit quaternions (x, y, z, w) as tuples, for compiled code: nothing here allocates.
+
+`rotate(world_from_hand, v)` turns a vector given in hand axes into world axes; `multiply(world_from_a, a_from_b)`
+chains. Tangents are rotation vectors [rad] in the body's own axes: `multiply(q, exp(w))`.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from arm_ik_service.compiled import compiled
+
+Vector = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
+
+X: Vector = (1.0, 0.0, 0.0)
+Y: Vector = (0.0, 1.0, 0.0)
+Z: Vector = (0.0, 0.0, 1.0)
+IDENTITY: Quaternion = (0.0, 0.0, 0.0, 1.0)
+
+
+@compiled
+def vector(a: Any) -> Vector:
+    """Read three numbers of an array into a vector."""
+    return (a[0], a[1], a[2])
+
+
+@compiled
+def quaternion(a: Any) -> Quaternion:
+    """Read four numbers of an array into a quaternion."""
+    return (a[0], a[1], a[2], a[3])
+
+
+@compiled
+def store(out: Any, value: Any) -> None:
+    """Write a vector or a quaternion into an array, in place."""
+    for i in range(len(value)):
+        out[i] = value[i]
+
+
+@compiled
+def add(a: Vector, b: Vector) -> Vector:
+    """a + b."""
+    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
+
+
+@compiled
+def subtract(a: Vector, b: Vector) -> Vector:
+    """a - b."""
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+
+
+@compiled
+def scale(s: float, a: Vector) -> Vector:
+    """s a."""
+    return (s * a[0], s * a[1], s * a[2])
+
+
+@compiled
+def lerp(a: Vector, b: Vector, s: float) -> Vector:
+    """a at s = 0, b at s = 1."""
+    return (a[0] + s * (b[0] - a[0]), a[1] + s * (b[1] - a[1]), a[2] + s * (b[2] - a[2]))
+
+
+@compiled
+def dot(a: Vector, b: Vector) -> float:
+    """Inner product."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@compiled
+def cross(a: Vector, b: Vector) -> Vector:
+    """Vector product."""
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+@compiled
+def norm(a: Vector) -> float:
+    """Length."""
+    return math.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
+
+
+@compiled
+def clip(x: float, lower: float, upper: float) -> float:
+    """Return x held to [lower, upper]."""
+    return lower if x < lower else (upper if x > upper else x)
+
+
+@compiled
+def wrap(angle: float) -> float:
+    """Return the angle in (-pi, pi] for an angle in (-3 pi, 3 pi)."""
+    if angle > math.pi:
+        return angle - 2.0 * math.pi
+    if angle <= -math.pi:
+        return angle + 2.0 * math.pi
+    return angle
+
+
+@compiled
+def multiply(a: Quaternion, b: Quaternion) -> Quaternion:
+    """Hamilton product: first b, then a."""
+    return (
+        a[3] * b[0] + a[0] * b[3] + a[1] * b[2] - a[2] * b[1],
+        a[3] * b[1] - a[0] * b[2] + a[1] * b[3] + a[2] * b[0],
+        a[3] * b[2] + a[0] * b[1] - a[1] * b[0] + a[2] * b[3],
+        a[3] * b[3] - a[0] * b[0] - a[1] * b[1] - a[2] * b[2],
+    )
+
+
+@compiled
+def conjugate(q: Quaternion) -> Quaternion:
+    """Inverse of a unit quaternion."""
+    return (-q[0], -q[1], -q[2], q[3])
+
+
+@compiled
+def normalized(q: Quaternion) -> Quaternion:
+    """Scale to unit length; q must not be zero."""
+    n = 1.0 / math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+    return (q[0] * n, q[1] * n, q[2] * n, q[3] * n)
+
+
+@compiled
+def rotate(q: Quaternion, v: Vector) -> Vector:
+    """Turn v by the unit quaternion q."""
+    tx = 2.0 * (q[1] * v[2] - q[2] * v[1])
+    ty = 2.0 * (q[2] * v[0] - q[0] * v[2])
+    tz = 2.0 * (q[0] * v[1] - q[1] * v[0])
+    return (
+        v[0] + q[3] * tx + q[1] * tz - q[2] * ty,
+        v[1] + q[3] * ty + q[2] * tx - q[0] * tz,
+        v[2] + q[3] * tz + q[0] * ty - q[1] * tx,
+    )
+
+
+@compiled
+def exp(w: Vector) -> Quaternion:
+    """Rotation vector [rad] to unit quaternion."""
+    angle = norm(w)
+    s = 0.5 if angle < 1e-9 else math.sin(0.5 * angle) / angle
+    return (s * w[0], s * w[1], s * w[2], math.cos(0.5 * angle))
+
+
+@compiled
+def log(q: Quaternion) -> Vector:
+    """Unit quaternion to the shortest rotation vector [rad], length at most pi."""
+    sign = -1.0 if q[3] < 0.0 else 1.0
+    n = math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2])
+    s = sign * (2.0 if n < 1e-12 else 2.0 * math.atan2(n, sign * q[3]) / n)
+    return (s * q[0], s * q[1], s * q[2])
+
+
+@compiled
+def rotation_x(angle: float) -> Quaternion:
+    """Rotation about x."""
+    return (math.sin(0.5 * angle), 0.0, 0.0, math.cos(0.5 * angle))
+
+
+@compiled
+def rotation_y(angle: float) -> Quaternion:
+    """Rotation about y."""
+    return (0.0, math.sin(0.5 * angle), 0.0, math.cos(0.5 * angle))
+
+
+@compiled
+def rotation_z(angle: float) -> Quaternion:
+    """Rotation about z."""
+    return (0.0, 0.0, math.sin(0.5 * angle), math.cos(0.5 * angle))
+
+
+@compiled
+def twist_y(q: Quaternion) -> float:
+    """Angle [rad] in (-pi, pi] of the twist about y in the decomposition q = swing * twist."""
+    return wrap(2.0 * math.atan2(q[1], q[3]))
+
+
+@compiled
+def swing_y(q: Quaternion) -> Quaternion:
+    """The swing of q = swing * twist about y: the shortest rotation that takes y where q takes it."""
+    return multiply(q, rotation_y(-twist_y(q)))
+
+
+@compiled
+def between(a: Vector, b: Vector) -> Quaternion:
+    """Shortest rotation from the unit vector a to the unit vector b; half a turn about some normal if opposite."""
+    w = 1.0 + dot(a, b)
+    if w < 1e-9:
+        helper = X if abs(a[0]) < 0.6 else Y
+        n = cross(a, helper)
+        n = scale(1.0 / norm(n), n)
+        return (n[0], n[1], n[2], 0.0)
+    c = cross(a, b)
+    return normalized((c[0], c[1], c[2], w))
+
+
+@compiled
+def from_columns(x: Vector, y: Vector, z: Vector) -> Quaternion:
+    """Quaternion of the rotation whose matrix has the orthonormal columns x, y, z (Shepperd's method)."""
+    trace = x[0] + y[1] + z[2]
+    if trace > 0.0:
+        s = math.sqrt(trace + 1.0) * 2.0
+        return ((y[2] - z[1]) / s, (z[0] - x[2]) / s, (x[1] - y[0]) / s, 0.25 * s)
+    if x[0] > y[1] and x[0] > z[2]:
+        s = math.sqrt(1.0 + x[0] - y[1] - z[2]) * 2.0
+        return (0.25 * s, (y[0] + x[1]) / s, (z[0] + x[2]) / s, (y[2] - z[1]) / s)
+    if y[1] > z[2]:
+        s = math.sqrt(1.0 + y[1] - x[0] - z[2]) * 2.0
+        return ((y[0] + x[1]) / s, 0.25 * s, (z[1] + y[2]) / s, (z[0] - x[2]) / s)
+    s = math.sqrt(1.0 + z[2] - x[0] - y[1]) * 2.0
+    return ((z[0] + x[2]) / s, (z[1] + y[2]) / s, 0.25 * s, (x[1] - y[0]) / s)
+
+
+@compiled
+def mirror_vector(v: Vector) -> Vector:
+    """Reflect a vector in the sagittal plane: x (to the right) changes sign."""
+    return (-v[0], v[1], v[2])
+
+
+@compiled
+def mirror_rotation(q: Quaternion) -> Quaternion:
+    """Reflect a rotation, or an axial vector's quaternion, in the sagittal plane."""
+    return (q[0], -q[1], -q[2], q[3])

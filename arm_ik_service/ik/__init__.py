@@ -1,0 +1,1 @@
+"""Solvers: target in, configuration out; joint velocities; elbow comfort."""

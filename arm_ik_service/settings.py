@@ -1,0 +1,70 @@
+"""Every number a user may turn, with its unit in its name. Read from TOML once; frozen from then on.
+
+`to_record` flattens one section into the numpy record that compiled code reads: numbers as they are, a choice such as
+`dead_reckoning = "freeze"` as its place in the list of choices.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Literal, get_args, get_origin, get_type_hints
+
+import msgspec
+import numpy as np
+
+from arm_ik_service.compiled import Record, record_dtype
+from arm_ik_service.errors import SettingsError
+
+
+class TrackingSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """One device in time."""
+
+
+class BodySettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """One person in space."""
+
+
+class SolverSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """One arm, target to configuration."""
+
+
+class ServiceSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The bus and what the service admits from it."""
+
+    key_prefix: str = ""  # put before every key, for several installations on one network
+
+
+class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """All of them, one TOML table a section."""
+
+    tracking: TrackingSettings = TrackingSettings()
+    body: BodySettings = BodySettings()
+    solver: SolverSettings = SolverSettings()
+    service: ServiceSettings = ServiceSettings()
+
+
+def load_settings(path: Path | None) -> Settings:
+    """Read settings from a TOML file; None gives the defaults. Raises SettingsError naming the file and the field."""
+    if path is None:
+        return Settings()
+    try:
+        return msgspec.toml.decode(path.read_bytes(), type=Settings)
+    except OSError as error:
+        raise SettingsError(f"settings file {path}: {error.strerror}") from error
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise SettingsError(f"settings file {path}: {error}") from error
+
+
+def _dtype_of(hint: Any) -> Any:
+    choice = get_origin(hint) is Literal
+    return np.int64 if choice or hint in (int, bool) else np.float64
+
+
+def to_record(section: msgspec.Struct) -> Record:
+    """Flatten a section of numbers and choices into one record of its field names."""
+    hints = get_type_hints(type(section))
+    record = np.zeros(1, record_dtype([(name, _dtype_of(hint)) for name, hint in hints.items()]))
+    for name, hint in hints.items():
+        value = getattr(section, name)
+        record[0][name] = get_args(hint).index(value) if get_origin(hint) is Literal else value
+    return record[0]

@@ -1,0 +1,1 @@
+"""One hand or head in time: validity, order, glitches, hold and loss, smoothing."""

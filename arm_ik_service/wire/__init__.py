@@ -1,0 +1,1 @@
+"""The messages on the bus, the bytes they travel in, and the keys they travel under."""

@@ -1,0 +1,128 @@
+"""The published messages, version 1. Metres, radians, seconds; times are integer nanoseconds; quaternions x y z w.
+
+World axes are OpenXR's: right-handed, +X right, +Y up, -Z forward. A field may be added within a version; readers
+ignore what they do not know. Anything else is a new version.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from msgspec import Meta, Struct
+
+VERSION = 1
+
+Nanoseconds = Annotated[int, Meta(ge=-(2**62), le=2**62)]
+Counter = Annotated[int, Meta(ge=0, le=2**62)]
+Vector = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
+
+# XrSpaceLocationFlagBits (OpenXR 1.1, 7.3)
+ORIENTATION_VALID = 1
+POSITION_VALID = 2
+ORIENTATION_TRACKED = 4
+POSITION_TRACKED = 8
+FULLY_TRACKED = ORIENTATION_VALID | POSITION_VALID | ORIENTATION_TRACKED | POSITION_TRACKED
+
+Space = Literal["stage", "local_floor", "local"]
+TrackingState = Literal["lost", "held", "inferred", "tracked"]
+Side = Literal["left", "right"]
+SIDES: tuple[Side, Side] = ("left", "right")
+
+
+class TrackedPose(Struct, frozen=True):
+    """A device at the frame's sample time: the head (VIEW space) or a hand (grip pose)."""
+
+    position: Vector
+    orientation: Quaternion
+    flags: Annotated[int, Meta(ge=0, le=2**31 - 1)] = FULLY_TRACKED
+    linear_velocity: Vector | None = None
+    angular_velocity: Vector | None = None
+
+
+class ControllerFrame(Struct, frozen=True):
+    """One sample of headset and controllers, on `avatar/<id>/controllers`. A device that is absent is null."""
+
+    version: int
+    seq: Counter
+    sample_time_ns: Nanoseconds  # the (predicted) time the poses are of; velocities are taken against it
+    publish_time_ns: Nanoseconds  # the sender's wall clock when it put the frame
+    space: Space
+    head: TrackedPose | None
+    left: TrackedPose | None
+    right: TrackedPose | None
+
+
+class Pose(Struct, frozen=True):
+    """A frame in world axes."""
+
+    position: Vector
+    orientation: Quaternion
+
+
+class JointAngles(Struct, frozen=True):
+    """The nine joint angles [rad], or their rates [rad/s]. Signs are equal on both sides; see models/README.md."""
+
+    shoulder_flexion: float  # rotation vector of the swing: part about the lateral axis
+    shoulder_abduction: float  # rotation vector of the swing: part about the anterior axis, away from the body
+    shoulder_twist: float  # about the humerus, internal positive
+    elbow_flexion: float
+    elbow_carrying: float
+    pronation: float
+    wrist_flexion: float
+    wrist_deviation: float
+    wrist_axial: float
+
+
+class IsbShoulder(Struct, frozen=True):
+    """The shoulder in ISB's Y-X-Y angles [rad] (Wu et al. 2005); plane and rotation mean little where `singular`."""
+
+    plane_of_elevation: float
+    elevation: float
+    axial_rotation: float
+    singular: bool
+
+
+class Bones(Struct, frozen=True):
+    """World poses of the segments at their proximal joints. The hand is OpenXR's wrist frame, the others ISB axes."""
+
+    clavicle: Pose
+    upper_arm: Pose
+    forearm: Pose
+    hand: Pose
+
+
+class ArmState(Struct, frozen=True):
+    """One arm. `configuration` and `velocity` are Pinocchio's q (10) and v (9) of models/human_arm.xml."""
+
+    tracking: TrackingState  # the worse of the two below
+    position_tracking: TrackingState
+    orientation_tracking: TrackingState
+    configuration: tuple[float, ...]
+    velocity: tuple[float, ...]
+    angles: JointAngles
+    angle_rates: JointAngles
+    isb_shoulder: IsbShoulder
+    bones: Bones
+    position_error_m: float
+    orientation_error_rad: float
+    reach_ratio: float  # distance shoulder to wrist asked for, over the length of the straight arm
+    iterations: int
+    limits: tuple[str, ...]  # names of the limits the arm rests on
+    elbow_confidence: float  # 0: any swivel is as comfortable; 1: the comfort is sharp
+
+
+class ArmsState(Struct, frozen=True):
+    """The answer to one ControllerFrame, on `avatar/<id>/arms`; `seq` and `sample_time_ns` are the frame's."""
+
+    version: int
+    avatar: str
+    seq: Counter
+    sample_time_ns: Nanoseconds
+    receive_time_ns: Nanoseconds  # the service's wall clock when the frame reached it
+    solve_time_ns: Nanoseconds  # a duration: decode to solved
+    publish_time_ns: Nanoseconds  # the service's wall clock when it put this message
+    chest: Pose
+    head: Pose
+    left: ArmState
+    right: ArmState
