@@ -126,3 +126,52 @@ class ArmsState(Struct, frozen=True):
     head: Pose
     left: ArmState
     right: ArmState
+
+
+class JointLimit(Struct, frozen=True):
+    """The range [rad] of one of the angles of JointAngles."""
+
+    name: str
+    lower: float
+    upper: float
+
+
+class Skeleton(Struct, frozen=True):
+    """What does not change from frame to frame, on `avatar/<id>/skeleton`: lengths [m] and limits."""
+
+    version: int
+    avatar: str
+    stature_m: float
+    shoulder_width_m: float
+    upper_arm_m: float
+    forearm_m: float
+    hand_m: float
+    joint_limits: tuple[JointLimit, ...]
+    limit_names: tuple[str, ...]  # every name that can stand in ArmState.limits
+
+
+class AvatarHealth(Struct, frozen=True):
+    """One avatar over the last second."""
+
+    avatar: str
+    frames_per_s: float
+    answered: int
+    overtaken: int  # frames that a newer one replaced before they were solved
+    refused: int
+    silent_s: float  # time since its last frame
+
+
+class Health(Struct, frozen=True):
+    """The state of one service, once a second on `arm_ik/<service>/health`. Counters run since the start."""
+
+    version: int
+    service: str
+    software: str
+    time_ns: Nanoseconds
+    uptime_s: float
+    answered: int
+    overtaken: int
+    refused: dict[str, int]  # cause -> count
+    latency_p50_ms: float  # receive to publish, over the last second
+    latency_p99_ms: float
+    avatars: tuple[AvatarHealth, ...]
