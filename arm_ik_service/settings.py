@@ -19,9 +19,15 @@ from arm_ik_service.errors import SettingsError
 class TrackingSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """One device in time."""
 
+    # what to do with poses that are valid but not tracked (dead-reckoned), and with none at all
+    dead_reckoning: Literal["freeze", "follow", "fade_to_rest"] = "freeze"
+    lost_after_s: float = 1.0  # without good data a device is held, after this long it is lost
+
 
 class BodySettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """One person in space."""
+
+    soft_reach_from: float = 0.98  # part of the straight arm at which the soft reach clamp sets in; 1 turns it off
 
 
 class SolverSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -16,7 +16,7 @@ SAMPLE = record_dtype(
         ("rotation", np.float64, (4,)),
         ("linear_velocity", np.float64, (3,)),
         ("angular_velocity", np.float64, (3,)),
-        ("flags", np.int64),  # XrSpaceLocationFlags; 0 where the device is absent
+        ("location_flags", np.int64),  # XrSpaceLocationFlags; 0 where the device is absent
         ("velocity_flags", np.int64),  # XrSpaceVelocityFlags: 1 linear valid, 2 angular valid
     ]
 )

@@ -1,0 +1,55 @@
+"""The body stage: tracked devices in; chest, shoulders and what is asked of each arm out."""
+
+from __future__ import annotations
+
+from arm_ik_service.body.chest import step_chest
+from arm_ik_service.body.reach import soft_reach
+from arm_ik_service.body.shoulders import step_shoulder
+from arm_ik_service.compiled import Record, compiled
+from arm_ik_service.geometry import scalar as g
+from arm_ik_service.tracking.clock import interval_s
+
+
+@compiled
+def _place_wrist(body: Record, tracking: Record, k: int) -> None:
+    hand, grip_from_wrist = tracking.hands[k], body.grip_from_wrist[k]
+    world_from_grip = g.quaternion(hand.rotation)
+    offset = g.rotate(world_from_grip, g.vector(grip_from_wrist.position))
+    rotation = g.multiply(world_from_grip, g.quaternion(grip_from_wrist.rotation))
+    g.store(body.wrists[k].position, g.add(g.vector(hand.position), offset))
+    g.store(body.wrists[k].rotation, g.normalized(rotation))
+
+
+@compiled
+def _set_target(body: Record, k: int, dt_s: float, settings: Record) -> None:
+    target, wrist = body.targets[k], body.wrists[k]
+    shoulder_from_world = g.conjugate(g.quaternion(body.chest_rotation))
+    away = g.subtract(g.vector(wrist.position), g.vector(body.shoulders[k]))
+    ratio = g.norm(away) / body.arm_length
+    granted = soft_reach(ratio, settings.soft_reach_from) / max(ratio, 1e-9)
+    position = g.rotate(shoulder_from_world, g.scale(granted, away))
+    rotation = g.normalized(g.multiply(shoulder_from_world, g.quaternion(wrist.rotation)))
+    if body.started and dt_s > 0.0:
+        rate = 1.0 / dt_s
+        moved = g.subtract(position, g.vector(target.position))
+        turned = g.log(g.multiply(rotation, g.conjugate(g.quaternion(target.rotation))))
+        g.store(target.linear_velocity, g.scale(rate, moved))
+        g.store(target.angular_velocity, g.scale(rate, turned))
+    body.reach_ratio[k] = ratio
+    g.store(target.position, position)
+    g.store(target.rotation, rotation)
+
+
+@compiled
+def step_body(body: Record, tracking: Record, settings: Record) -> None:
+    """Place the person in the BODY record for the devices of the TRACKING record. Always finite."""
+    g.store(body.head_position, g.vector(tracking.head.position))
+    g.store(body.head_rotation, g.quaternion(tracking.head.rotation))
+    elapsed_s = interval_s(tracking)
+    dt_s = elapsed_s if tracking.dt_s > 0.0 else 0.0
+    step_chest(body, tracking, elapsed_s)
+    for k in range(2):
+        _place_wrist(body, tracking, k)
+        step_shoulder(body, k)
+        _set_target(body, k, dt_s, settings)
+    body.started = 1

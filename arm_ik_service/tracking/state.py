@@ -1,0 +1,75 @@
+"""What tracking knows of one person: the head and two hands in time, and the clock they share."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from arm_ik_service.compiled import Record, record_dtype
+
+# tracking states, in the order of wire.messages.TrackingState; the worse one is the smaller one
+LOST, HELD, INFERRED, TRACKED = 0, 1, 2, 3
+
+# verdicts of step_tracking
+ACCEPTED = 0
+OUT_OF_ORDER = 1  # an older sample than the last accepted one: refused, nothing changed
+DUPLICATE = 2  # the last accepted frame once more: refused, nothing changed
+
+NEVER_S = 1e9  # age of data that never came
+
+DEVICE = record_dtype(
+    [
+        # world axes; finite and unit at all times
+        ("position", np.float64, (3,)),
+        ("rotation", np.float64, (4,)),
+        ("linear_velocity", np.float64, (3,)),
+        ("angular_velocity", np.float64, (3,)),
+        ("position_state", np.int64),
+        ("rotation_state", np.int64),
+        ("position_age_s", np.float64),  # since the last position that was good
+        ("rotation_age_s", np.float64),
+    ]
+)
+CLOCK = record_dtype(
+    [
+        ("started", np.int64),
+        ("seq", np.int64),  # of the last accepted frame
+        ("period_s", np.float64),  # running estimate; stands in for an interval of nought
+        ("refused", np.int64),  # length of the present run of refused frames that are in order among themselves
+        ("refused_since_ns", np.int64),  # receive time of its first
+        ("refused_sample_time_ns", np.int64),  # sample time of its last
+        ("steps", np.int64),  # how often the sender's clock was found to have stepped back
+    ]
+)
+TRACKING = record_dtype(
+    [
+        ("head", DEVICE),
+        ("hands", DEVICE, (2,)),  # left, right
+        ("sample_time_ns", np.int64),
+        ("dt_s", np.float64),  # since the frame before; 0 for the first, for a repeated time, after a clock step
+        ("clock", CLOCK),
+    ]
+)
+
+# Grip poses of arms that hang at rest, fingers down, palms inwards, in axes at the head that share its yaw; from a
+# standing person of 1.75 m.
+HEAD_AT_REST = (0.0, 1.63, 0.0)
+HANDS_AT_REST = ((-0.25, -0.87, 0.05), (0.25, -0.87, 0.05))
+GRIPS_AT_REST = ((0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0, 1.0))
+
+
+def _reset_device(device: Record, position: Any, rotation: Any) -> None:
+    device.position[:], device.rotation[:] = position, rotation
+    device.position_state = device.rotation_state = LOST
+    device.position_age_s = device.rotation_age_s = NEVER_S
+
+
+def initialise_tracking(tracking: Record) -> None:
+    """Set a TRACKING record to someone who stands at the origin, looks along -Z and was never seen: all `LOST`."""
+    for name in TRACKING.names or ():
+        tracking[name] = np.zeros((), TRACKING[name])
+    _reset_device(tracking.head, HEAD_AT_REST, (0.0, 0.0, 0.0, 1.0))
+    for k in range(2):
+        position = np.add(HEAD_AT_REST, HANDS_AT_REST[k])
+        _reset_device(tracking.hands[k], position, GRIPS_AT_REST[k])
