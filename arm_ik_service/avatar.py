@@ -40,7 +40,7 @@ def step_batch(
     body_settings: Record,
     solver_settings: Record,
 ) -> None:
-    """Run every stage for `count` frames: frame k is of the avatar in row `indices[k]`, its verdict goes out."""
+    """Run every stage for `count` frames in order: frame k is of the avatar in row `indices[k]` and fills output k."""
     for k in range(count):
         row = rows[indices[k]]
         verdicts[k] = step_tracking(row.tracking, frames[k], receive_times_ns[k], tracking_settings)
@@ -49,25 +49,29 @@ def step_batch(
         step_body(row.body, row.tracking, body_settings)
         for side in range(2):
             step_arm(row.arms[side], row.body.targets[side], row.tracking.dt_s, solver_settings)
-        write_output(outputs[indices[k]], row.tracking, row.body, row.arms)
+        write_output(outputs[k], row.tracking, row.body, row.arms)
 
 
 class Avatars:
-    """Rows for up to `capacity` avatars and everything a step needs, allocated once."""
+    """Rows for `capacity` avatars and a batch of up to `batch` frames of any of them, all allocated once."""
 
-    def __init__(self, settings: Settings | None = None, capacity: int = 1) -> None:
-        """Raises ModelError where the arm model cannot be loaded."""
+    def __init__(self, settings: Settings | None = None, *, capacity: int = 1, batch: int = 1) -> None:
         settings = settings or Settings()
-        self.capacity = capacity
         self._rows = np.zeros(capacity, AVATAR)
-        self._outputs = np.zeros(capacity, OUTPUT)
-        self._frames = np.zeros(capacity, FRAME)
-        self._indices = np.zeros(capacity, np.int64)
-        self._receive_times_ns = np.zeros(capacity, np.int64)
-        self.verdicts = np.zeros(capacity, np.int64)
+        self._frames = np.zeros(batch, FRAME)
+        self._indices = np.zeros(batch, np.int64)
+        self._receive_times_ns = np.zeros(batch, np.int64)
+        self._outputs = np.zeros(batch, OUTPUT)
+        self.verdicts = np.zeros(batch, np.int64)
         self._settings = (to_record(settings.tracking), to_record(settings.body), to_record(settings.solver))
         self._models: dict[Profile, tuple[ArmModel, ArmModel]] = {}
         self.count = 0
+
+    def reserve(self, capacity: int) -> None:
+        """Make room for at least `capacity` avatars; those there keep their state."""
+        missing = capacity - len(self._rows)
+        if missing > 0:
+            self._rows = np.concatenate([self._rows, np.zeros(missing, AVATAR)])
 
     def reset(self, index: int, profile: Profile) -> None:
         """Make row `index` a person of this profile at rest. Raises ModelError or ProfileError."""
@@ -89,7 +93,7 @@ class Avatars:
         return models
 
     def add(self, index: int, frame: ControllerFrame, receive_time_ns: int) -> int:
-        """Put a frame of the avatar in row `index` into the batch; returns its place there."""
+        """Put a frame of the avatar in row `index` at the end of the batch; returns its place there."""
         place = self.count
         pack_frame(frame, self._frames, place)
         self._indices[place] = index
@@ -113,17 +117,17 @@ class Avatars:
 
     def answer(
         self,
-        index: int,
+        place: int,
         frame: ControllerFrame,
         avatar: str,
         receive_time_ns: int,
         solve_time_ns: int = 0,
         publish_time_ns: int = 0,
     ) -> ArmsState:
-        """Return the message that answers the accepted frame of row `index`."""
+        """Return the message that answers the accepted frame at `place` of the last batch."""
         return read_output(
             self._outputs,
-            index,
+            place,
             avatar=avatar,
             seq=frame.seq,
             sample_time_ns=frame.sample_time_ns,
@@ -146,7 +150,7 @@ class Avatar:
     ) -> None:
         """Raises ModelError or ProfileError where no arm can be built from the profile."""
         self.name = name
-        self._avatars = Avatars(settings, capacity=1)
+        self._avatars = Avatars(settings)
         self._avatars.reset(0, profile or Profile())
 
     def step(self, frame: ControllerFrame, now_ns: int) -> ArmsState | None:

@@ -7,13 +7,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Literal, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
 import msgspec
 import numpy as np
+from msgspec import Meta
 
 from arm_ik_service.compiled import Record, record_dtype
 from arm_ik_service.errors import SettingsError
+from arm_ik_service.wire.messages import Encoding
 
 
 class TrackingSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -35,9 +37,15 @@ class SolverSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class ServiceSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The bus and what the service admits from it."""
+    """The bus, and what the service admits from it. Every limit is there so that one sender cannot hurt another."""
 
     key_prefix: str = ""  # put before every key, for several installations on one network
+    encoding: Encoding = "msgpack"  # of what goes out; what comes in may be either
+    max_avatars: Annotated[int, Meta(ge=1, le=100_000)] = 256  # rows are allocated at the start, about 6 KiB each
+    max_message_bytes: Annotated[int, Meta(ge=512)] = 4096  # the largest honest frame is about 1 KiB, in JSON
+    max_id_length: Annotated[int, Meta(ge=1, le=255)] = 64  # an id is also a file name and an entity path
+    forget_after_s: Annotated[float, Meta(gt=0.0)] = 60.0  # a silent avatar gives its row back
+    health_period_s: Annotated[float, Meta(ge=0.1)] = 1.0
 
 
 class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

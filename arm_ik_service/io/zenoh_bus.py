@@ -16,7 +16,8 @@ from typing import Any, Literal
 import zenoh
 
 from arm_ik_service.errors import BusError
-from arm_ik_service.wire.codec import MEDIA_TYPES, Encoding
+from arm_ik_service.wire.codec import MEDIA_TYPES
+from arm_ik_service.wire.messages import Encoding
 
 LOOPBACK = "tcp/127.0.0.1:7447"  # 7447 is Zenoh's registered port; loopback: opening to a network is a choice
 _ATTEMPT_MS = 1000  # zenoh.open cannot be interrupted, so it is tried in short attempts

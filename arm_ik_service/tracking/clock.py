@@ -9,23 +9,12 @@ from __future__ import annotations
 from arm_ik_service.compiled import Record, compiled
 from arm_ik_service.tracking.state import ACCEPTED, DUPLICATE, OUT_OF_ORDER
 
-STEP_AFTER_NS = 100_000_000  # older frames, and only such, for so long: the sender was restarted
-STEP_AFTER_FRAMES = 24  # the same where the receive time stands still or is unknown
+STEP_AFTER_NS = 100_000_000  # nothing newer was received for so long: an older sample is from a sender that restarted
+RECEIVER_STEP_NS = 10_000_000_000  # our own clock went back by more than this: it was set, and proves nothing
 FIRST_PERIOD_S = 1.0 / 90.0  # of a headset
 LONGEST_PERIOD_S = 0.1  # a longer interval is a gap and says nothing about the period
 PERIOD_GAIN = 0.05  # of the running estimate: it follows a new rate within a third of a second
 SHORTEST_INTERVAL = 0.25  # of the period: what is nearer together shares a jittery clock rather than a moment
-
-
-@compiled
-def _stepped_back(clock: Record, sample_time_ns: int, now_ns: int) -> bool:
-    """Whether frames have been refused for so long, in order among themselves, that the sender must have restarted."""
-    if clock.refused == 0 or sample_time_ns < clock.refused_sample_time_ns or now_ns < clock.refused_since_ns:
-        clock.refused, clock.refused_since_ns = 0, now_ns
-    clock.refused += 1
-    clock.refused_sample_time_ns = sample_time_ns
-    waited = now_ns - clock.refused_since_ns >= STEP_AFTER_NS and clock.refused > 1
-    return bool(waited or clock.refused > STEP_AFTER_FRAMES)
 
 
 @compiled
@@ -38,11 +27,12 @@ def step_clock(tracking: Record, seq: int, sample_time_ns: int, now_ns: int) -> 
     elif dt_ns == 0 and seq == clock.seq:
         return DUPLICATE
     elif dt_ns < 0:
-        if not _stepped_back(clock, sample_time_ns, now_ns):
+        # Judged by accepted frames alone: a refusal leaves no trace, so solving what was accepted gives the same bytes.
+        if -RECEIVER_STEP_NS < now_ns - clock.accepted_at_ns < STEP_AFTER_NS:
             return OUT_OF_ORDER
         clock.steps += 1
         dt_ns = 0
-    clock.refused = 0
+    clock.accepted_at_ns = now_ns
     clock.seq = seq
     tracking.sample_time_ns = sample_time_ns
     tracking.dt_s = 1e-9 * dt_ns

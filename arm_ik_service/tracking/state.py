@@ -36,9 +36,7 @@ CLOCK = record_dtype(
         ("started", np.int64),
         ("seq", np.int64),  # of the last accepted frame
         ("period_s", np.float64),  # running estimate; stands in for an interval of nought
-        ("refused", np.int64),  # length of the present run of refused frames that are in order among themselves
-        ("refused_since_ns", np.int64),  # receive time of its first
-        ("refused_sample_time_ns", np.int64),  # sample time of its last
+        ("accepted_at_ns", np.int64),  # receive time of the last accepted frame
         ("steps", np.int64),  # how often the sender's clock was found to have stepped back
     ]
 )

@@ -6,14 +6,13 @@ opens one with `{` and no MessagePack map can begin with that byte. Reading the 
 
 from __future__ import annotations
 
-from typing import Any, Generic, Literal, TypeVar
+from typing import Any, Generic, TypeVar
 
 import msgspec
 
 from arm_ik_service.errors import DecodeError, VersionError
-from arm_ik_service.wire.messages import VERSION, ArmsState, ControllerFrame, Health, Skeleton
+from arm_ik_service.wire.messages import VERSION, ArmsState, ControllerFrame, Encoding, Health, Skeleton
 
-Encoding = Literal["msgpack", "json"]
 MEDIA_TYPES: dict[Encoding, str] = {"msgpack": "application/msgpack", "json": "application/json"}
 
 Message = TypeVar("Message")

@@ -26,6 +26,7 @@ FULLY_TRACKED = ORIENTATION_VALID | POSITION_VALID | ORIENTATION_TRACKED | POSIT
 
 Space = Literal["stage", "local_floor", "local"]
 TrackingState = Literal["lost", "held", "inferred", "tracked"]
+Encoding = Literal["msgpack", "json"]
 Side = Literal["left", "right"]
 SIDES: tuple[Side, Side] = ("left", "right")
 
