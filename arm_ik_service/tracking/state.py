@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-from arm_ik_service.compiled import Record, record_dtype
+from arm_ik_service.compiled import record_dtype
 
 # tracking states, in the order of wire.messages.TrackingState; the worse one is the smaller one
 LOST, HELD, INFERRED, TRACKED = 0, 1, 2, 3
@@ -15,6 +13,7 @@ LOST, HELD, INFERRED, TRACKED = 0, 1, 2, 3
 ACCEPTED = 0
 OUT_OF_ORDER = 1  # an older sample than the last accepted one: refused, nothing changed
 DUPLICATE = 2  # the last accepted frame once more: refused, nothing changed
+REFUSALS = {OUT_OF_ORDER: "out of order", DUPLICATE: "duplicate"}
 
 NEVER_S = 1e9  # age of data that never came
 
@@ -55,19 +54,3 @@ TRACKING = record_dtype(
 HEAD_AT_REST = (0.0, 1.63, 0.0)
 HANDS_AT_REST = ((-0.25, -0.87, 0.05), (0.25, -0.87, 0.05))
 GRIPS_AT_REST = ((0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0, 1.0))
-
-
-def _reset_device(device: Record, position: Any, rotation: Any) -> None:
-    device.position[:], device.rotation[:] = position, rotation
-    device.position_state = device.rotation_state = LOST
-    device.position_age_s = device.rotation_age_s = NEVER_S
-
-
-def initialise_tracking(tracking: Record) -> None:
-    """Set a TRACKING record to someone who stands at the origin, looks along -Z and was never seen: all `LOST`."""
-    for name in TRACKING.names or ():
-        tracking[name] = np.zeros((), TRACKING[name])
-    _reset_device(tracking.head, HEAD_AT_REST, (0.0, 0.0, 0.0, 1.0))
-    for k in range(2):
-        position = np.add(HEAD_AT_REST, HANDS_AT_REST[k])
-        _reset_device(tracking.hands[k], position, GRIPS_AT_REST[k])

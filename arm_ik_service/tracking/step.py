@@ -2,10 +2,42 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+import numpy as np
+
 from arm_ik_service.compiled import Record, compiled
+from arm_ik_service.geometry.scalar import IDENTITY
 from arm_ik_service.tracking.clock import interval_s, step_clock
 from arm_ik_service.tracking.device import step_device
-from arm_ik_service.tracking.state import ACCEPTED
+from arm_ik_service.tracking.state import (
+    ACCEPTED,
+    GRIPS_AT_REST,
+    HANDS_AT_REST,
+    HEAD_AT_REST,
+    LOST,
+    NEVER_S,
+    REFUSALS,
+    TRACKING,
+)
+
+__all__ = ["ACCEPTED", "REFUSALS", "initialise_tracking", "step_tracking"]
+
+
+def _reset_device(device: Record, position: Any, rotation: Any) -> None:
+    device.position[:], device.rotation[:] = position, rotation
+    device.position_state = device.rotation_state = LOST
+    device.position_age_s = device.rotation_age_s = NEVER_S
+
+
+def initialise_tracking(tracking: Record) -> None:
+    """Set a TRACKING record to someone who stands at the origin, looks along -Z and was never seen: all `LOST`."""
+    for name in TRACKING.names or ():
+        tracking[name] = np.zeros((), TRACKING[name])
+    _reset_device(tracking.head, HEAD_AT_REST, IDENTITY)
+    for k in range(2):
+        position = np.add(HEAD_AT_REST, HANDS_AT_REST[k])
+        _reset_device(tracking.hands[k], position, GRIPS_AT_REST[k])
 
 
 @compiled
