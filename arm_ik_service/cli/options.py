@@ -1,0 +1,72 @@
+"""Options that several commands share, and how each becomes what the programs take."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from arm_ik_service.io.zenoh_bus import BusOptions
+
+Connect = Annotated[
+    list[str] | None,
+    typer.Option("--connect", metavar="ENDPOINT", help="Zenoh endpoint to connect to, e.g. tcp/127.0.0.1:7447.",
+                 rich_help_panel="Zenoh"),
+]
+Listen = Annotated[
+    list[str] | None,
+    typer.Option("--listen", metavar="ENDPOINT", help="Zenoh endpoint to listen on.", rich_help_panel="Zenoh"),
+]
+Scouting = Annotated[
+    bool,
+    typer.Option("--scouting/--no-scouting", help="Find other Zenoh peers by multicast.", rich_help_panel="Zenoh"),
+]
+ZenohConfig = Annotated[
+    Path | None,
+    typer.Option("--zenoh-config", metavar="FILE", help="A whole Zenoh configuration, JSON5.",
+                 rich_help_panel="Zenoh"),
+]
+ProfileFile = Annotated[
+    Path | None,
+    typer.Option("--profile", metavar="FILE", help="Calibration profile of the person, TOML."),
+]
+SettingsFile = Annotated[
+    Path | None,
+    typer.Option("--settings", metavar="FILE", help="Settings that differ from the defaults, TOML."),
+]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object for machines instead of text.")]
+
+
+def bus_options(
+    connect: list[str] | None, listen: list[str] | None, scouting: bool, zenoh_config: Path | None
+) -> BusOptions:
+    """Gather the Zenoh options."""
+    from arm_ik_service.io.zenoh_bus import BusOptions
+
+    return BusOptions(tuple(connect or ()), tuple(listen or ()), scouting, zenoh_config)
+
+
+@contextmanager
+def stopped_by_signals(stop: Callable[[], None]) -> Iterator[None]:
+    """Within the block Ctrl-C and SIGTERM call `stop`, so that the work ends cleanly; a second Ctrl-C interrupts."""
+
+    def handle(number: int, frame: Any) -> None:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        stop()
+
+    previous = {number: signal.signal(number, handle) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for number, handler in previous.items():
+            signal.signal(number, handler)
+
+
+def say(text: str) -> None:
+    """Write a line for people: to standard error, so that output stays clean for machines."""
+    typer.echo(text, err=True)

@@ -1,0 +1,65 @@
+"""`arm-ik serve`."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from arm_ik_service.cli.options import (
+    Connect,
+    Listen,
+    ProfileFile,
+    Scouting,
+    SettingsFile,
+    ZenohConfig,
+    bus_options,
+    say,
+    stopped_by_signals,
+)
+
+
+def serve(
+    name: Annotated[str | None, typer.Option(help="Name of this service on the bus; default: host and process.")] = None,
+    profile: ProfileFile = None,
+    settings: SettingsFile = None,
+    connect: Connect = None,
+    listen: Listen = None,
+    scouting: Scouting = False,
+    zenoh_config: ZenohConfig = None,
+) -> None:
+    """Solve both arms of everybody who publishes on avatar/<id>/controllers, and publish avatar/<id>/arms.
+
+    Listens on loopback, tcp/127.0.0.1:7447, unless told otherwise; no router is needed.
+
+    Example: [bold]arm-ik serve --listen tcp/0.0.0.0:7447 --profile me.toml[/bold]
+    """
+    import logging
+    import os
+    import re
+    import socket
+    import time
+
+    from arm_ik_service.body.profile import load_profile
+    from arm_ik_service.cli.warm_up import warm_up
+    from arm_ik_service.io.zenoh_bus import open_hub
+    from arm_ik_service.settings import load_settings
+    from arm_ik_service.wire.keys import check_id
+
+    began_s = time.perf_counter()
+    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
+    host = re.sub(r"[^A-Za-z0-9_-]", "-", socket.gethostname())[:40]
+    service_name = check_id(name or f"{host}-{os.getpid()}")
+    options = bus_options(connect, listen, scouting, zenoh_config)
+    used_profile, used_settings = load_profile(profile), load_settings(settings)
+    with open_hub(options) as bus:
+        warm_up(used_settings, say)
+        from arm_ik_service.programs.service import Service
+
+        service = Service(bus, name=service_name, settings=used_settings, profile=used_profile)
+        with stopped_by_signals(service.stop):
+            where = ", ".join(options.listens_on()) or str(zenoh_config)
+            say(f"ready in {time.perf_counter() - began_s:.1f} s: {service_name} serves on {where}; Ctrl-C ends it")
+            service.run()
+        service.close()
+        say(service.farewell())

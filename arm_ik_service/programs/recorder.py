@@ -1,0 +1,111 @@
+"""Writing what is on the bus to an MCAP file: controllers in, arms out, skeletons and calibrations."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from threading import Event
+
+import zenoh
+
+from arm_ik_service.errors import WireError
+from arm_ik_service.io.recording import RecordingWriter
+from arm_ik_service.wire import codec
+from arm_ik_service.wire.keys import Keys
+
+QUERY_TIMEOUT_S = 0.5
+
+
+@dataclass
+class Recorded:
+    """What was written."""
+
+    frames: int = 0
+    answers: int = 0
+    refused: int = 0
+
+
+class Recorder:
+    """Records every avatar on an open Zenoh session, which the caller closes.
+
+    Messages wait in memory between Zenoh's thread and the file: a slow disk costs memory, never a frame.
+    """
+
+    def __init__(
+        self, bus: zenoh.Session, path: Path, keys: Keys, *, progress: Callable[[Recorded], None] | None = None
+    ) -> None:
+        """Raises SessionError where the file cannot be made."""
+        self._bus = bus
+        self._keys = keys
+        self._progress = progress
+        self._stopped = Event()
+        self._queue: SimpleQueue[tuple[str, str, bytes, int]] = SimpleQueue()
+        self._described: set[str] = set()
+        self._recorded = Recorded()
+        self._writer = RecordingWriter(path)
+        self._subscribers = [
+            bus.declare_subscriber(keys.controllers(), self._into_queue("controllers")),
+            bus.declare_subscriber(keys.arms(), self._into_queue("arms")),
+        ]
+
+    def _into_queue(self, kind: str) -> zenoh.handlers.Callback:
+        def receive(sample: zenoh.Sample) -> None:
+            self._queue.put((kind, str(sample.key_expr), sample.payload.to_bytes(), time.time_ns()))
+
+        return zenoh.handlers.Callback(receive, indirect=False)
+
+    def stop(self) -> None:
+        """Make `run` return once what has arrived is written; safe in a signal handler."""
+        self._stopped.set()
+
+    def run(self, duration_s: float | None = None) -> Recorded:
+        """Record until `stop` or for `duration_s`, then close the file; it is whole whatever happens in between."""
+        end_s = None if duration_s is None else time.monotonic() + duration_s
+        with self._writer:
+            while not self._stopped.is_set() and (end_s is None or time.monotonic() < end_s):
+                self._drain(wait_s=0.1)
+            for subscriber in self._subscribers:
+                subscriber.undeclare()
+            self._drain(wait_s=0.0)
+        return self._recorded
+
+    def _drain(self, wait_s: float) -> None:
+        try:
+            item = self._queue.get(timeout=wait_s) if wait_s > 0.0 else self._queue.get_nowait()
+            while True:
+                self._write(*item)
+                item = self._queue.get_nowait()
+        except Empty:
+            pass
+        self._writer.flush_if_due()
+        if self._progress is not None:
+            self._progress(self._recorded)
+
+    def _write(self, kind: str, key: str, payload: bytes, receive_time_ns: int) -> None:
+        avatar = self._keys.avatar_of(key)
+        try:
+            if kind == "controllers":
+                self._writer.write_frame(avatar, codec.controller_frames.decode(payload), receive_time_ns)
+                self._recorded.frames += 1
+            else:
+                self._writer.write_arms(avatar, codec.arms_states.decode(payload), receive_time_ns)
+                self._recorded.answers += 1
+        except WireError:
+            self._recorded.refused += 1
+            return
+        if kind == "arms" and avatar not in self._described:
+            self._described.add(avatar)
+            self._describe(avatar, receive_time_ns)
+
+    def _describe(self, avatar: str, time_ns: int) -> None:
+        """Ask the service for what it does not publish every frame; a service that is gone simply does not answer."""
+        for key, write in (
+            (self._keys.skeleton(avatar), self._writer.write_skeleton),
+            (self._keys.calibration(avatar), self._writer.write_calibration),
+        ):
+            for reply in self._bus.get(key, timeout=QUERY_TIMEOUT_S):
+                if reply.ok is not None:
+                    write(avatar, reply.ok.payload.to_bytes(), time_ns)
