@@ -15,8 +15,12 @@ if TYPE_CHECKING:
 
 Connect = Annotated[
     list[str] | None,
-    typer.Option("--connect", metavar="ENDPOINT", help="Zenoh endpoint to connect to, e.g. tcp/127.0.0.1:7447.",
-                 rich_help_panel="Zenoh"),
+    typer.Option(
+        "--connect",
+        metavar="ENDPOINT",
+        help="Zenoh endpoint to connect to, e.g. tcp/127.0.0.1:7447.",
+        rich_help_panel="Zenoh",
+    ),
 ]
 Listen = Annotated[
     list[str] | None,
@@ -28,8 +32,7 @@ Scouting = Annotated[
 ]
 ZenohConfig = Annotated[
     Path | None,
-    typer.Option("--zenoh-config", metavar="FILE", help="A whole Zenoh configuration, JSON5.",
-                 rich_help_panel="Zenoh"),
+    typer.Option("--zenoh-config", metavar="FILE", help="A whole Zenoh configuration, JSON5.", rich_help_panel="Zenoh"),
 ]
 ProfileFile = Annotated[
     Path | None,

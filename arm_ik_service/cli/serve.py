@@ -20,7 +20,9 @@ from arm_ik_service.cli.options import (
 
 
 def serve(
-    name: Annotated[str | None, typer.Option(help="Name of this service on the bus; default: host and process.")] = None,
+    name: Annotated[
+        str | None, typer.Option(help="Name of this service on the bus; default: host and process.")
+    ] = None,
     profile: ProfileFile = None,
     settings: SettingsFile = None,
     connect: Connect = None,

@@ -16,8 +16,6 @@ from typing import Any, Literal
 import zenoh
 
 from arm_ik_service.errors import BusError
-from arm_ik_service.wire.codec import MEDIA_TYPES
-from arm_ik_service.wire.messages import Encoding
 
 LOOPBACK = "tcp/127.0.0.1:7447"  # 7447 is Zenoh's registered port; loopback: opening to a network is a choice
 _ATTEMPT_MS = 1000  # zenoh.open cannot be interrupted, so it is tried in short attempts
@@ -108,17 +106,3 @@ def open_client(
 def _reason(error: Exception) -> str:
     """The first line of Zenoh's error, without the source positions it appends."""
     return str(error).splitlines()[0].split(" at /")[0].strip()
-
-
-def declare_stream(session: zenoh.Session, key: str, encoding: Encoding) -> zenoh.Publisher:
-    """Declare a publisher for a stream of states.
-
-    Not express, and dropped under congestion: measured, `express` loses 4 % of a burst and costs 30 us a put instead
-    of 3.5; blocking lets one slow reader hold a put for seconds.
-    """
-    return session.declare_publisher(
-        key,
-        encoding=zenoh.Encoding(MEDIA_TYPES[encoding]),
-        congestion_control=zenoh.CongestionControl.DROP,
-        express=False,
-    )

@@ -9,14 +9,11 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 from threading import Event
 
-import zenoh
-
 from arm_ik_service.errors import WireError
 from arm_ik_service.io.recording import RecordingWriter
+from arm_ik_service.io.zenoh_streams import Bus, query, subscribe
 from arm_ik_service.wire import codec
 from arm_ik_service.wire.keys import Keys
-
-QUERY_TIMEOUT_S = 0.5
 
 
 @dataclass
@@ -34,9 +31,7 @@ class Recorder:
     Messages wait in memory between Zenoh's thread and the file: a slow disk costs memory, never a frame.
     """
 
-    def __init__(
-        self, bus: zenoh.Session, path: Path, keys: Keys, *, progress: Callable[[Recorded], None] | None = None
-    ) -> None:
+    def __init__(self, bus: Bus, path: Path, keys: Keys, *, progress: Callable[[Recorded], None] | None = None) -> None:
         """Raises SessionError where the file cannot be made."""
         self._bus = bus
         self._keys = keys
@@ -47,15 +42,9 @@ class Recorder:
         self._recorded = Recorded()
         self._writer = RecordingWriter(path)
         self._subscribers = [
-            bus.declare_subscriber(keys.controllers(), self._into_queue("controllers")),
-            bus.declare_subscriber(keys.arms(), self._into_queue("arms")),
+            subscribe(bus, key, lambda *arrival, kind=kind: self._queue.put((kind, *arrival)))
+            for kind, key in (("controllers", keys.controllers()), ("arms", keys.arms()))
         ]
-
-    def _into_queue(self, kind: str) -> zenoh.handlers.Callback:
-        def receive(sample: zenoh.Sample) -> None:
-            self._queue.put((kind, str(sample.key_expr), sample.payload.to_bytes(), time.time_ns()))
-
-        return zenoh.handlers.Callback(receive, indirect=False)
 
     def stop(self) -> None:
         """Make `run` return once what has arrived is written; safe in a signal handler."""
@@ -106,6 +95,5 @@ class Recorder:
             (self._keys.skeleton(avatar), self._writer.write_skeleton),
             (self._keys.calibration(avatar), self._writer.write_calibration),
         ):
-            for reply in self._bus.get(key, timeout=QUERY_TIMEOUT_S):
-                if reply.ok is not None:
-                    write(avatar, reply.ok.payload.to_bytes(), time_ns)
+            for _, payload in query(self._bus, key):
+                write(avatar, payload, time_ns)

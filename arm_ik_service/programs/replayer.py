@@ -7,10 +7,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from threading import Event
 
-import zenoh
-
 from arm_ik_service.io.session import RecordedFrame, Session
-from arm_ik_service.io.zenoh_bus import declare_stream
+from arm_ik_service.io.zenoh_streams import Bus, Stream, declare_stream
 from arm_ik_service.wire import codec
 from arm_ik_service.wire.keys import Keys
 from arm_ik_service.wire.messages import ControllerFrame, Encoding
@@ -64,7 +62,7 @@ class Replayer:
 
     def __init__(
         self,
-        bus: zenoh.Session,
+        bus: Bus,
         session: Session,
         options: ReplayOptions,
         keys: Keys,
@@ -78,7 +76,7 @@ class Replayer:
         self._keys = keys
         self._progress = progress
         self._warn = warn
-        self._publishers: dict[str, zenoh.Publisher] = {}
+        self._publishers: dict[str, Stream] = {}
         self._stopped = Event()
 
     def stop(self) -> None:
@@ -134,7 +132,7 @@ class Replayer:
             return None
         return latest_ns - first.sample_time_ns + int(interval_s * 1e9), highest_seq - first.seq + 1
 
-    def _publisher(self, avatar: str) -> zenoh.Publisher:
+    def _publisher(self, avatar: str) -> Stream:
         """Return the avatar's publisher; the first time, wait until somebody listens."""
         publisher = self._publishers.get(avatar)
         if publisher is None:

@@ -8,21 +8,21 @@ from __future__ import annotations
 import gc
 import logging
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import zenoh
 
 import arm_ik_service
 from arm_ik_service.avatar import Avatars
 from arm_ik_service.body.profile import Profile
 from arm_ik_service.errors import DecodeError, VersionError
-from arm_ik_service.io.zenoh_bus import declare_stream
 from arm_ik_service.io.zenoh_inbox import Arrival, Inbox
-from arm_ik_service.programs.skeleton import skeleton_of
+from arm_ik_service.io.zenoh_streams import Bus, Stream, answer_queries, announce, declare_stream, put_once
+from arm_ik_service.skeleton import skeleton_of
 from arm_ik_service.settings import Settings
-from arm_ik_service.tracking.step import ACCEPTED, REFUSALS
+from arm_ik_service.tracking.state import ACCEPTED, REFUSALS
 from arm_ik_service.wire import codec
 from arm_ik_service.wire.keys import Keys
 from arm_ik_service.wire.messages import VERSION, AvatarHealth, Health
@@ -38,7 +38,7 @@ class Seat:
 
     name: str
     index: int
-    publisher: zenoh.Publisher
+    publisher: Stream
     profile: Profile
     last_arrival_ns: int
     answered: int = 0
@@ -71,7 +71,7 @@ class _Latencies:
 class Service:
     """One process's worth of avatars on an open Zenoh session, which the caller closes."""
 
-    def __init__(self, session: zenoh.Session, *, name: str, settings: Settings, profile: Profile) -> None:
+    def __init__(self, session: Bus, *, name: str, settings: Settings, profile: Profile) -> None:
         """Allocate and declare everything. Raises ModelError or ProfileError where no arm can be built."""
         limits = settings.service
         self._session = session
@@ -99,10 +99,10 @@ class Service:
         )
         self._health = declare_stream(session, self._keys.health(name), limits.encoding)
         self._queryables = [
-            session.declare_queryable(self._keys.skeleton(), self._answer_skeleton),
-            session.declare_queryable(self._keys.calibration(), self._answer_calibration),
+            answer_queries(session, self._keys.skeleton(), self._skeletons, limits.encoding),
+            answer_queries(session, self._keys.calibration(), self._calibrations, limits.encoding),
         ]
-        self._token = session.liveliness().declare_token(self._keys.liveliness(name))
+        self._token = announce(session, self._keys.liveliness(name))
 
     def stop(self) -> None:
         """Make `run` return after the frame in hand; safe in a signal handler."""
@@ -160,9 +160,7 @@ class Service:
                 self._refuse(REFUSALS[verdict], f"{seat.name}: seq {frame.seq}", seat)
                 continue
             publish_time_ns = time.time_ns()
-            state = self._avatars.answer(
-                place, frame, seat.name, arrival.receive_time_ns, solve_ns, publish_time_ns
-            )
+            state = self._avatars.answer(place, frame, seat.name, arrival.receive_time_ns, solve_ns, publish_time_ns)
             seat.publisher.put(codec.encode(state, encoding))
             seat.answered += 1
             self._answered += 1
@@ -180,11 +178,7 @@ class Service:
             arrival.receive_time_ns,
         )
         self._seats[arrival.avatar] = seat
-        self._session.put(
-            self._keys.skeleton(arrival.avatar),
-            codec.encode(skeleton_of(seat.name, seat.profile), self._limits.encoding),
-            encoding=codec.MEDIA_TYPES[self._limits.encoding],
-        )
+        put_once(self._session, *self._skeleton(seat), self._limits.encoding)
         log.info("avatar %s: serving", arrival.avatar)
         return seat
 
@@ -237,16 +231,20 @@ class Service:
         # an absolute schedule, but never a burst of healths after a stall
         self._health_at_s = max(self._health_at_s + period_s, time.monotonic())
 
-    def _answer_skeleton(self, query: zenoh.Query) -> None:
-        self._reply(query, self._keys.skeleton, lambda seat: skeleton_of(seat.name, seat.profile))
+    def _skeleton(self, seat: Seat) -> tuple[str, bytes]:
+        message = skeleton_of(seat.name, seat.profile)
+        return self._keys.skeleton(seat.name), codec.encode(message, self._limits.encoding)
 
-    def _answer_calibration(self, query: zenoh.Query) -> None:
-        self._reply(query, self._keys.calibration, lambda seat: seat.profile)
-
-    def _reply(self, query: zenoh.Query, key: Any, message: Any) -> None:
-        """Answer a query for one avatar or, by wildcard, for all; runs on a Zenoh thread."""
-        encoding = self._limits.encoding
+    def _skeletons(self) -> Iterator[tuple[str, bytes]]:
+        """What there is to answer to a query; runs on a Zenoh thread."""
         for seat in list(self._seats.values()):
-            own_key = key(seat.name)
-            if query.key_expr.intersects(zenoh.KeyExpr(own_key)):
-                query.reply(own_key, codec.encode(message(seat), encoding), encoding=codec.MEDIA_TYPES[encoding])
+            yield self._skeleton(seat)
+
+    def _calibrations(self) -> Iterator[tuple[str, bytes]]:
+        for seat in list(self._seats.values()):
+            yield self._keys.calibration(seat.name), codec.encode(seat.profile, self._limits.encoding)
+
+    def farewell(self) -> str:
+        """Return one line that says what was served."""
+        refused = ", ".join(f"{count} {cause}" for cause, count in self._refused.items()) or "none"
+        return f"answered {self._answered} frames, overtaken {self._overtaken}, refused: {refused}"

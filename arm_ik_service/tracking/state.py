@@ -13,6 +13,7 @@ LOST, HELD, INFERRED, TRACKED = 0, 1, 2, 3
 ACCEPTED = 0
 OUT_OF_ORDER = 1  # an older sample than the last accepted one: refused, nothing changed
 DUPLICATE = 2  # the last accepted frame once more: refused, nothing changed
+REFUSALS = {OUT_OF_ORDER: "out_of_order", DUPLICATE: "duplicate"}  # names for health
 REFUSALS = {OUT_OF_ORDER: "out of order", DUPLICATE: "duplicate"}
 
 NEVER_S = 1e9  # age of data that never came
