@@ -1,0 +1,14 @@
+"""The Rerun view: both arms as solids, the poses asked for, and every number over time. The only importer of Rerun.
+
+RerunView             takes messages, writes to sinks
+LiveView              the same behind a thread: never waits, drops the oldest
+write_recording       a solved session as an .rrd
+write_picture         a moment of an .rrd as a .png, without a display
+Save Spawn Connect Web   where a view can go
+"""
+
+from arm_ik_service.io.rerun_view.picture import write_picture
+from arm_ik_service.io.rerun_view.sinks import Connect, Save, Sink, Spawn, Web, has_display
+from arm_ik_service.io.rerun_view.view import OPENXR_GRIP, RerunView, write_recording
+
+__all__ = ["OPENXR_GRIP", "Connect", "RerunView", "Save", "Sink", "Spawn", "Web", "has_display", "write_picture", "write_recording"]

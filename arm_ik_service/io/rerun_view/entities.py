@@ -1,0 +1,227 @@
+"""What is logged of one avatar, and where: `avatar/<id>/...`. Solids once; then transforms, lines and numbers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+import numpy.typing as npt
+import rerun as rr
+
+from arm_ik_service.geometry import batch
+from arm_ik_service.io.rerun_view import figure
+from arm_ik_service.io.rerun_view.palette import LATENCY_COLOURS, LIMIT, RESIDUAL, SIDE_COLOURS, STATE_COLOURS
+from arm_ik_service.io.rerun_view.rows import ANGLES, LATENCIES, PLACES, STATES, Floats, Rows
+from arm_ik_service.io.rerun_view.solids import Solid
+from arm_ik_service.wire.messages import SIDES, VERSION, ArmsState, Pose, Side, Skeleton, TrackingState
+
+NECK_ROOT = (0.0, 0.065, 0.004)  # top of the torso in the chest frame [m]
+GIRDLE_ROOT = (0.035, 0.014, 0.0)  # of the right side, in the chest frame [m]
+SKULL_BASE = (0.0, -0.075, 0.082)  # in the head frame [m]
+LINE_RADIUS_M = 0.0035
+FOREARM_PER_STATURE, HAND_PER_FOREARM = 0.146, 0.108 / 0.146  # Drillis & Contini 1966
+HIDDEN = 1e-6  # scale of what is not there
+
+
+def entity_of(avatar: str) -> str:
+    """Entity path of an avatar."""
+    return rr.new_entity_path(["avatar", avatar]).lstrip("/")
+
+
+def _mesh(solid: Solid) -> rr.Mesh3D:
+    return rr.Mesh3D(
+        vertex_positions=solid.vertices.astype(np.float32),
+        vertex_normals=solid.normals.astype(np.float32),
+        triangle_indices=solid.triangles,
+        vertex_colors=solid.colours,
+    )
+
+
+def skeleton_of(arms: ArmsState) -> Skeleton:
+    """Measure a person from one message, for want of a description: without limits."""
+    bones = (arms.left.bones, arms.right.bones)
+    upper_arm = sum(math.dist(b.upper_arm.position, b.forearm.position) for b in bones) / 2
+    forearm = sum(math.dist(b.forearm.position, b.hand.position) for b in bones) / 2
+    return Skeleton(
+        version=VERSION,
+        avatar=arms.avatar,
+        stature_m=forearm / FOREARM_PER_STATURE,
+        shoulder_width_m=math.dist(arms.left.bones.upper_arm.position, arms.right.bones.upper_arm.position),
+        upper_arm_m=upper_arm,
+        forearm_m=forearm,
+        hand_m=forearm * HAND_PER_FOREARM,
+        joint_limits=(),
+        limit_names=(),
+    )
+
+
+def _solids(skeleton: Skeleton) -> dict[str, Solid]:
+    parts = {"chest": figure.torso(skeleton.shoulder_width_m), "neck": figure.neck(), "head": figure.head()}
+    for side in SIDES:
+        parts[f"{side}/shoulder"] = figure.shoulder_girdle()
+        parts[f"{side}/upper_arm"] = figure.upper_arm(side, skeleton.upper_arm_m)
+        parts[f"{side}/forearm"] = figure.forearm(side, skeleton.forearm_m)
+        parts[f"{side}/hand"] = figure.hand(side, skeleton.hand_m)
+        parts[f"{side}/target"] = figure.controller()
+    return parts
+
+
+def log_styles(recording: rr.RecordingStream, root: str) -> None:
+    """Log the names and colours of every line and band of one avatar, static."""
+    sides = [SIDE_COLOURS[side] for side in SIDES]
+    for name in ANGLES:
+        recording.log(
+            f"{root}/plots/angles/{name}",
+            rr.SeriesLines(
+                colors=[LIMIT, LIMIT, *sides],
+                widths=[1.0, 1.0, 1.6, 1.6],
+                names=["lower limit", "upper limit", *SIDES],
+            ),
+            static=True,
+        )
+        recording.log(
+            f"{root}/plots/rates/{name}", rr.SeriesLines(colors=sides, widths=[1.6] * 2, names=SIDES), static=True
+        )
+    recording.log(f"{root}/plots/residual_mm", rr.SeriesLines(colors=sides, widths=[1.6] * 2, names=SIDES), static=True)
+    recording.log(
+        f"{root}/plots/latency_ms",
+        rr.SeriesLines(colors=LATENCY_COLOURS, widths=[1.4] * 3, names=LATENCIES),
+        static=True,
+    )
+    for side in SIDES:
+        recording.log(
+            f"{root}/{side}/residual",
+            rr.LineStrips3D.from_fields(colors=[RESIDUAL], radii=[LINE_RADIUS_M]),
+            static=True,
+        )
+        recording.log(
+            f"{root}/plots/tracking/{side}",
+            rr.StateConfiguration(values=STATES, colors=[STATE_COLOURS[state] for state in STATES]),
+            static=True,
+        )
+
+
+def between_y(direction: Floats) -> Floats:
+    """Shortest rotations (N,4) that take +Y to the directions (N,3), which need not be of unit length."""
+    d = batch.normalized(direction)
+    turned = np.stack([d[:, 2], np.zeros(len(d)), -d[:, 0], 1.0 + d[:, 1]], axis=-1)
+    turned[d[:, 1] < -1.0 + 1e-9] = (1.0, 0.0, 0.0, 0.0)
+    return batch.normalized(turned)
+
+
+class Sender:
+    """Sends the gathered rows of one avatar as columns."""
+
+    def __init__(self, recording: rr.RecordingStream, root: str) -> None:
+        self._limits_deg: Floats = np.full((len(ANGLES), 2), np.nan)
+        self._wrist_from_grip: dict[Side, Floats] = {}
+        self._recording = recording
+        self._root = root
+        self._states: dict[Side, TrackingState | None] = dict.fromkeys(SIDES)
+        self._time: list[rr.TimeColumn] = []
+
+    def describe(self, skeleton: Skeleton, wrist_from_grip: Mapping[Side, Pose]) -> None:
+        """Log the solids, static; from now on the plots have these limits, the residual line starts at these grips."""
+        for name, solid in _solids(skeleton).items():
+            self._recording.log(f"{self._root}/{name}", _mesh(solid), static=True)
+        limits = {limit.name: (limit.lower, limit.upper) for limit in skeleton.joint_limits}
+        self._limits_deg = np.rad2deg([limits.get(name, (np.nan, np.nan)) for name in ANGLES])
+        self._wrist_from_grip = {
+            side: np.array([*grip.position, *grip.orientation]) for side, grip in wrist_from_grip.items()
+        }
+
+    def send(self, rows: Rows) -> None:
+        """Log all of `rows` under their own times, in their order."""
+        if not len(rows):
+            return
+        values = np.array(rows.values)
+        frames, times = np.array(rows.frames, np.int64), np.array(rows.times_ns, np.int64)
+        self._time = _time(frames, times)
+        self._send_trunk(values)
+        for k, side in enumerate(SIDES):
+            self._send_side(side, values)
+            self._send_state(side, [pair[k] for pair in rows.states], frames, times)
+        self._send_plots(values)
+
+    def _columns(self, entity: str, columns: Iterable[rr.ComponentColumn]) -> None:
+        self._recording.send_columns(f"{self._root}/{entity}", self._time, columns)
+
+    def _move(self, entity: str, pose: Floats) -> None:
+        self._columns(entity, rr.Transform3D.columns(translation=pose[:, :3], quaternion=pose[:, 3:]))
+
+    def _span(self, entity: str, start: Floats, end: Floats, length_m: float) -> None:
+        """Stretch a solid that is built along +Y, `length_m` long, from start to end (N,3)."""
+        axis = end - start
+        scale = np.ones_like(axis)
+        scale[:, 1] = np.linalg.norm(axis, axis=1) / length_m
+        self._columns(entity, rr.Transform3D.columns(translation=start, quaternion=between_y(axis), scale=scale))
+
+    def _send_trunk(self, values: Floats) -> None:
+        chest, head = values[:, PLACES["chest"]], values[:, PLACES["head"]]
+        self._move("chest", chest)
+        self._move("head", head)
+        root = chest[:, :3] + batch.rotate(chest[:, 3:], NECK_ROOT)
+        top = head[:, :3] + batch.rotate(head[:, 3:], SKULL_BASE)
+        self._span("neck", root, top, figure.NECK_M)
+
+    def _send_side(self, side: Side, values: Floats) -> None:
+        upper_arm, forearm, hand, target = (
+            values[:, PLACES[f"{side}/{name}"]] for name in ("upper_arm", "forearm", "hand", "target")
+        )
+        chest = values[:, PLACES["chest"]]
+        x, y, z = GIRDLE_ROOT
+        root = chest[:, :3] + batch.rotate(chest[:, 3:], (-x if side == "left" else x, y, z))
+        self._span(f"{side}/shoulder", root, upper_arm[:, :3], figure.GIRDLE_M)
+        for name, pose in (("upper_arm", upper_arm), ("forearm", forearm), ("hand", hand)):
+            self._move(f"{side}/{name}", pose)
+
+        there = np.isfinite(target).all(axis=1)
+        shown = np.where(there[:, None], target, hand)
+        self._columns(
+            f"{side}/target",
+            rr.Transform3D.columns(
+                translation=shown[:, :3],
+                quaternion=shown[:, 3:],
+                scale=np.repeat(np.where(there, 1.0, HIDDEN)[:, None], 3, axis=1),
+            ),
+        )
+        held = batch.compose(hand, self._wrist_from_grip[side])[:, :3]
+        line = np.stack([held, np.where(there[:, None], target[:, :3], held)], axis=1)
+        self._columns(f"{side}/residual", rr.LineStrips3D.columns(strips=line))
+
+    def _send_state(self, side: Side, states: list[TrackingState], frames: Floats, times: Floats) -> None:
+        """Log the state where it changes: the band of the plot and the colour of the hand."""
+        before = [self._states[side], *states[:-1]]
+        changed = [k for k, (a, b) in enumerate(zip(before, states, strict=True)) if a != b]
+        self._states[side] = states[-1]
+        if not changed:
+            return
+        time = _time(frames[changed], times[changed])
+        new = [states[k] for k in changed]
+        colours = np.array([(*STATE_COLOURS[state], 255) for state in new], np.uint8)
+        self._recording.send_columns(f"{self._root}/{side}/hand", time, rr.Mesh3D.columns(albedo_factor=colours))
+        self._recording.send_columns(f"{self._root}/plots/tracking/{side}", time, rr.StateChange.columns(state=new))
+
+    def _scalars(self, entity: str, series: Floats) -> None:
+        count, width = series.shape
+        self._columns(f"plots/{entity}", rr.Scalars.columns(scalars=series.reshape(-1)).partition([width] * count))
+
+    def _send_plots(self, values: Floats) -> None:
+        angles = [np.rad2deg(values[:, PLACES[f"{side}/angles"]]) for side in SIDES]
+        rates = [np.rad2deg(values[:, PLACES[f"{side}/rates"]]) for side in SIDES]
+        flat = np.ones(len(values))
+        for k, name in enumerate(ANGLES):
+            lower, upper = self._limits_deg[k]
+            self._scalars(f"angles/{name}", np.stack([lower * flat, upper * flat, *(a[:, k] for a in angles)], axis=1))
+            self._scalars(f"rates/{name}", np.stack([r[:, k] for r in rates], axis=1))
+        residual = [values[:, PLACES[f"{side}/residual_mm"]] for side in SIDES]
+        self._scalars("residual_mm", np.concatenate(residual, axis=1))
+        self._scalars("latency_ms", values[:, PLACES["latency_ms"]])
+
+
+def _time(frames: npt.NDArray[np.int64], times_ns: npt.NDArray[np.int64]) -> list[rr.TimeColumn]:
+    return [
+        rr.TimeColumn("frame", sequence=frames),
+        rr.TimeColumn("sample_time", duration=times_ns.astype("timedelta64[ns]")),
+    ]

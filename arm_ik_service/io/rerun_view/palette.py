@@ -1,0 +1,17 @@
+"""The colours that carry meaning, in the picture, in the plots and in the legend alike."""
+
+from __future__ import annotations
+
+from arm_ik_service.io.rerun_view.solids import Colour
+from arm_ik_service.wire.messages import Side, TrackingState
+
+SIDE_COLOURS: dict[Side, Colour] = {"left": (74, 144, 226), "right": (240, 140, 58)}  # apart for the colour-blind too
+STATE_COLOURS: dict[TrackingState, Colour] = {
+    "tracked": (76, 190, 120),
+    "inferred": (240, 205, 70),
+    "held": (226, 80, 150),
+    "lost": (120, 126, 138),
+}
+LIMIT: Colour = (150, 70, 76)
+RESIDUAL: Colour = (255, 60, 90)
+LATENCY_COLOURS: tuple[Colour, Colour, Colour] = ((120, 170, 220), (170, 130, 220), (220, 220, 225))

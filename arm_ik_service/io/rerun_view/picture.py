@@ -1,0 +1,85 @@
+"""A moment of an .rrd as a picture, without a display: a headless viewer is started, told the time, and asked."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import socket
+import subprocess
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+from rerun.experimental import ViewerClient
+
+from arm_ik_service.errors import ViewError
+from arm_ik_service.io.rerun_view.sinks import viewer_binary
+
+START_WITHIN_S = 60.0  # software rendering on a busy machine takes its time
+SETTLED_AFTER_S = 1.0  # from the change of time to a picture in which every plot has followed
+
+
+def write_picture(
+    recording: Path, picture: Path, *, frame: int | None = None, width: int = 1600, height: int = 900
+) -> None:
+    """Write what the viewer shows of `recording` (.rrd) at `frame` (the last one if None) as a .png.
+
+    The picture has twice the given size in pixels. Needs a Vulkan driver; Mesa's software one (lavapipe) will do.
+    Raises ViewError.
+    """
+    if not recording.is_file():
+        raise ViewError(f"no recording at {recording}")
+    with _headless_viewer(recording, width, height) as viewer:
+        last = _last_frame(viewer)
+        viewer.set_time("frame", sequence=last if frame is None else frame, play_state="paused")
+        time.sleep(SETTLED_AFTER_S)
+        viewer.save_screenshot(str(picture.resolve()))
+    if not picture.is_file():
+        raise ViewError(f"the viewer wrote no picture to {picture}: may it write there?")
+
+
+@contextlib.contextmanager
+def _headless_viewer(recording: Path, width: int, height: int) -> Iterator[ViewerClient]:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    options = ["--headless", "--bind", "127.0.0.1", "--port", str(port), "--window-size", f"{width}x{height}"]
+    with tempfile.TemporaryDirectory() as folder, (Path(folder) / "log").open("w+") as log:
+        # What the viewer logs it also shows, over the plots: hence only errors. The folder stands in for a session's.
+        environment = {"XDG_RUNTIME_DIR": folder, **os.environ, "RUST_LOG": "error"}
+        process = subprocess.Popen(
+            [str(viewer_binary()), str(recording), *options], stdout=log, stderr=log, env=environment
+        )
+        try:
+            yield _wait_until_loaded(f"rerun+http://127.0.0.1:{port}/proxy", process, Path(log.name))
+        except (RuntimeError, ConnectionError) as error:
+            raise ViewError(f"the headless viewer failed: {error}") from error
+        finally:
+            process.terminate()
+            process.wait(timeout=10.0)
+
+
+def _wait_until_loaded(url: str, process: subprocess.Popen[bytes], log: Path) -> ViewerClient:
+    give_up = time.monotonic() + START_WITHIN_S
+    viewer: ViewerClient | None = None
+    while time.monotonic() < give_up:
+        if process.poll() is not None:
+            said = log.read_text().strip().splitlines()
+            why = said[-1] if said else f"exit code {process.returncode}"
+            raise ViewError(f"the headless viewer ended: {why} (it needs a Vulkan driver, such as mesa-vulkan-drivers)")
+        with contextlib.suppress(RuntimeError, ConnectionError):
+            viewer = viewer or ViewerClient.connect(url)
+            state = viewer.get_state()
+            if not state.loading and any(recording.timelines for recording in state.recordings):
+                return viewer
+        time.sleep(0.1)
+    raise ViewError(f"the headless viewer was not ready within {START_WITHIN_S:.0f} s")
+
+
+def _last_frame(viewer: ViewerClient) -> int:
+    for recording in viewer.get_state().recordings:
+        for timeline in recording.timelines:
+            if timeline.name == "frame" and timeline.end is not None:
+                return timeline.end
+    raise ViewError("the recording has no timeline `frame`: it was not written by this view")

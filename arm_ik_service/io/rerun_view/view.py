@@ -1,0 +1,138 @@
+"""The view of one or many avatars: takes messages, writes Rerun."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+from uuid import uuid4
+
+import rerun as rr
+
+from arm_ik_service.io.rerun_view.blueprint import blueprint_of
+from arm_ik_service.io.rerun_view.entities import Sender, entity_of, log_styles, skeleton_of
+from arm_ik_service.io.rerun_view.rows import Rows
+from arm_ik_service.io.rerun_view.sinks import Save, Sink, attach
+from arm_ik_service.wire.messages import ArmsState, ControllerFrame, Pose, Side, Skeleton
+
+APPLICATION = "arm_ik"
+BATCH_ROWS = 512  # offline: rows gathered before they are sent; a call then costs nothing a row
+OPENXR_GRIP: dict[Side, Pose] = {  # wrist_from_grip of DESIGN section 2
+    "left": Pose((0.0, -0.02, -0.075), (0.5, -0.5, -0.5, 0.5)),
+    "right": Pose((0.0, -0.02, -0.075), (0.5, 0.5, 0.5, 0.5)),
+}
+LEGEND = """\
+**sleeves and plots** blue: left, orange: right. **dark red lines**: joint limits. **white controller**: the pose asked for.
+**red line**: from the hand to it.  **hands** green: tracked, yellow: inferred, pink: held, grey: lost.
+"""
+
+
+@dataclass
+class _Person:
+    root: str
+    sender: Sender
+    chest: Pose
+    rows: Rows = field(default_factory=Rows)
+
+
+class RerunView:
+    """Logs what is added to one or several sinks. One thread at a time.
+
+    >>> with RerunView(Save(Path("session.rrd"))) as view:
+    ...     view.describe(skeleton)
+    ...     view.add(arms, frame)
+
+    Timelines: `frame` (seq) and `sample_time` (duration). Nothing is sent before `flush`, `close`, or BATCH_ROWS rows.
+    """
+
+    def __init__(self, *sinks: Sink, name: str = "", spacing_m: float = 0.0) -> None:
+        """Open the sinks; `name` titles the recording, `spacing_m` sets avatars apart that share one origin.
+
+        Raises ViewError.
+        """
+        self._recording = rr.RecordingStream(APPLICATION, recording_id=uuid4(), send_properties=True)
+        attach(self._recording, sinks)
+        self._spacing_m = spacing_m
+        self._people: dict[str, _Person] = {}
+        self._described: dict[str, tuple[Skeleton, Mapping[Side, Pose]]] = {}
+        if name:
+            self._recording.send_recording_name(name)
+        self._recording.log("/", rr.ViewCoordinates.RIGHT_HAND_Y_UP, static=True)
+        self._recording.log("/legend", rr.TextDocument(LEGEND, media_type=rr.MediaType.MARKDOWN), static=True)
+
+    def describe(self, skeleton: Skeleton, wrist_from_grip: Mapping[Side, Pose] = OPENXR_GRIP) -> None:
+        """Take in what does not change of an avatar: lengths, joint limits, grips. Again where that did change.
+
+        An avatar that was never described has its lengths measured from its first message, and no limits in its plots.
+        """
+        self._described[skeleton.avatar] = skeleton, wrist_from_grip
+        if (person := self._people.get(skeleton.avatar)) is not None:
+            self._send(person)
+            person.sender.describe(skeleton, wrist_from_grip)
+
+    def add(self, arms: ArmsState, frame: ControllerFrame | None) -> None:
+        """Gather one answer and the frame it answers (None where that was missed: no target is drawn)."""
+        person = self._people.get(arms.avatar) or self._meet(arms)
+        person.rows.add(frame, arms)
+        if len(person.rows) >= BATCH_ROWS:
+            self._send(person)
+
+    def flush(self) -> None:
+        """Send what was gathered. Does not wait for the viewer."""
+        for person in self._people.values():
+            self._send(person)
+
+    def close(self) -> None:
+        """Send the rest, finish the file and let go of the viewer."""
+        self.flush()
+        self._recording.flush(timeout_sec=5.0)
+        self._recording.disconnect()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _send(self, person: _Person) -> None:
+        rows, person.rows = person.rows, Rows()
+        person.sender.send(rows)
+
+    def _meet(self, arms: ArmsState) -> _Person:
+        """Log everything static of an avatar that is seen for the first time, and lay the viewer out anew."""
+        root = entity_of(arms.avatar)
+        person = _Person(root, Sender(self._recording, root), arms.chest)
+        offset = self._spacing_m * len(self._people)
+        if offset:
+            self._recording.log(root, rr.Transform3D(translation=(offset, 0.0, 0.0)), static=True)
+            x, y, z = arms.chest.position
+            person.chest = Pose((x + offset, y, z), arms.chest.orientation)
+        self._people[arms.avatar] = person
+        log_styles(self._recording, root)
+        person.sender.describe(*self._described.get(arms.avatar, (skeleton_of(arms), OPENXR_GRIP)))
+        roots = {name: one.root for name, one in self._people.items()}
+        self._recording.send_blueprint(blueprint_of(roots, [one.chest for one in self._people.values()]))
+        return person
+
+
+def write_recording(
+    path: Path,
+    answers: Iterable[tuple[ControllerFrame | None, ArmsState]],
+    skeleton: Skeleton | None = None,
+    *,
+    wrist_from_grip: Mapping[Side, Pose] = OPENXR_GRIP,
+    name: str = "",
+) -> int:
+    """Write a solved session to an .rrd, in constant memory; returns the number of frames. Raises ViewError."""
+    count = 0
+    with RerunView(Save(path), name=name) as view:
+        if skeleton is not None:
+            view.describe(skeleton, wrist_from_grip)
+        for frame, arms in answers:
+            view.add(arms, frame)
+            count += 1
+    return count
