@@ -6,6 +6,8 @@ import numpy as np
 
 from arm_ik_service.compiled import record_dtype
 
+ARM_LENGTH_OF_FIT = 0.56  # [m] of the people that the body's constants are from: lengths scale with the arm's
+
 POSE = record_dtype([("position", np.float64, (3,)), ("rotation", np.float64, (4,))])
 TARGET = record_dtype(
     [
@@ -35,5 +37,6 @@ BODY = record_dtype(
         # memory
         ("started", np.int64),
         ("yaw", np.float64),  # of the chest, about +Y
+        ("settled", np.float64),  # how far the shoulders have been found to sit below where they were thought to be
     ]
 )
