@@ -1,0 +1,140 @@
+"""The shoulder's limits: where the humerus may point, and how far it may turn about itself.
+
+Swing: the directions the humerus may take form a region that is star-shaped around a centre direction: the angle from
+the centre to the edge is a smooth function of azimuth (a Fourier series through eight angles of the model file).
+Twist: the angle about the humerus in the decomposition q = swing * twist from the hanging arm. That angle is singular
+with the arm straight up, where the direction of approach alone would decide it, so the twist range opens smoothly to a
+full turn between 140 and 165 degrees of elevation.
+
+Both are functions of the shoulder quaternion; gradients are with respect to the humerus' angular velocity in its own
+axes (the model's tangent), so `gradient . omega` is the rate at which the limit is approached.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from arm_ik_service.arm.chain import Columns
+from arm_ik_service.compiled import Record, compiled
+from arm_ik_service.geometry.scalar import (
+    Quaternion,
+    Vector,
+    clip,
+    dot,
+    exp,
+    multiply,
+    normalized,
+    rotation_y,
+    scale,
+)
+
+_OPENS_AT = 0.766  # height of the humerus' direction, sine of 50 degrees above horizontal
+_OPEN_AT = 0.966  # sine of 75 degrees
+
+
+@compiled
+def twist_of(bone: Columns) -> float:
+    """Twist about y [rad] in (-pi, pi] of a rotation given as columns."""
+    return math.atan2(bone[2][0] - bone[0][2], bone[0][0] + bone[2][2])
+
+
+@compiled
+def _opening(height: float) -> float:
+    """How far the twist range has opened: 0 below _OPENS_AT, 1 above _OPEN_AT."""
+    s = clip((height - _OPENS_AT) / (_OPEN_AT - _OPENS_AT), 0.0, 1.0)
+    return s * s * (3.0 - 2.0 * s)
+
+
+@compiled
+def twist_excess(chain: Record, twist: float, height: float) -> float:
+    """Angle [rad] by which a twist leaves its range: negative below, positive above, 0 inside.
+
+    `height` is the y of the humerus' direction: -1 hanging, 1 straight up.
+    """
+    open_ = _opening(height)
+    lower = chain.twist_lower - open_ * (math.pi + chain.twist_lower)
+    upper = chain.twist_upper + open_ * (math.pi - chain.twist_upper)
+    return twist - lower if twist < lower else (twist - upper if twist > upper else 0.0)
+
+
+@compiled
+def twist_gradient(q: Quaternion) -> Vector:
+    """Rate of the twist angle per unit angular velocity of the humerus in its own axes; singular straight up."""
+    x, y, z, w = q
+    n = 1.0 / max(y * y + w * w, 1e-12)
+    return ((w * z + x * y) * n, 1.0, (y * z - w * x) * n)
+
+
+@compiled
+def swing_edge(chain: Record, cosine: float, sine: float) -> tuple[float, float]:
+    """Angle from the centre to the edge [rad] at an azimuth given by cosine and sine, and its slope over azimuth."""
+    c, s = 1.0, 0.0
+    angle, slope = chain.swing_cosines[0], 0.0
+    for k in range(1, 5):
+        c, s = c * cosine - s * sine, s * cosine + c * sine
+        angle += chain.swing_cosines[k] * c + chain.swing_sines[k] * s
+        slope += k * (chain.swing_sines[k] * c - chain.swing_cosines[k] * s)
+    return angle, slope
+
+
+@compiled
+def swing_excess(chain: Record, direction: Vector) -> float:
+    """Angle [rad] by which the humerus' unit direction lies beyond the edge; negative inside, at least -1 deep inside."""
+    centre = chain.swing_centre
+    along = direction[0] * centre[0] + direction[1] * centre[1] + direction[2] * centre[2]
+    if along > chain.swing_surely_inside:
+        return -1.0
+    a, b = chain.swing_side, chain.swing_up
+    x = direction[0] * a[0] + direction[1] * a[1] + direction[2] * a[2]
+    y = direction[0] * b[0] + direction[1] * b[1] + direction[2] * b[2]
+    n = max(math.sqrt(x * x + y * y), 1e-9)
+    return math.atan2(n, along) - swing_edge(chain, x / n, y / n)[0]
+
+
+@compiled
+def swing_gradient(chain: Record, bone: Columns) -> Vector:
+    """Rate of `swing_excess` per unit angular velocity of the humerus in its own axes."""
+    u = scale(-1.0, bone[1])
+    centre, side, up = chain.swing_centre, chain.swing_side, chain.swing_up
+    c = (centre[0], centre[1], centre[2])
+    a = (side[0], side[1], side[2])
+    b = (up[0], up[1], up[2])
+    along, x, y = dot(u, c), dot(u, a), dot(u, b)
+    n = max(math.sqrt(x * x + y * y), 1e-9)
+    slope = swing_edge(chain, x / n, y / n)[1]
+    # theta = atan2(n, along); its gradient over u is (along * n' - n * c), n' = (x a + y b) / n; azimuth: (x b - y a) / n^2
+    g = (0.0, 0.0, 0.0)
+    px, py = along * x / n + slope * y / (n * n), along * y / n - slope * x / (n * n)
+    g = (px * a[0] + py * b[0] - n * c[0], px * a[1] + py * b[1] - n * c[1], px * a[2] + py * b[2] - n * c[2])
+    # u' = omega x u in body axes: u = -y, so omega = (wx, 0, wz) moves it by wz x - wx z
+    return (-dot(g, bone[2]), 0.0, dot(g, bone[0]))
+
+
+@compiled
+def clamp_twist(chain: Record, q: Quaternion, bone: Columns) -> Quaternion:
+    """Return the humerus turned back about itself to the edge of the twist range, if it lies beyond."""
+    excess = twist_excess(chain, twist_of(bone), -bone[1][1])
+    return q if excess == 0.0 else multiply(q, rotation_y(-excess))
+
+
+@compiled
+def clamp_swing(chain: Record, q: Quaternion, bone: Columns) -> Quaternion:
+    """Return the humerus swung straight towards the centre to the edge of its region, if it lies beyond."""
+    u = scale(-1.0, bone[1])
+    excess = swing_excess(chain, u)
+    if excess <= 0.0:
+        return q
+    centre = chain.swing_centre
+    c = (centre[0], centre[1], centre[2])
+    # body-axis rotation that takes u towards the centre: axis u x c, here in body axes with u = -y
+    cx, cz = dot(c, bone[0]), dot(c, bone[2])
+    n = max(math.sqrt(cx * cx + cz * cz), 1e-9)
+    return normalized(multiply(q, exp((-cz * excess / n, 0.0, cx * excess / n))))
+
+
+@compiled
+def clamp_hinges(chain: Record, configuration: Any) -> None:
+    """Clip the six hinges of a configuration (10,) to their ranges, in place."""
+    for i in range(6):
+        configuration[4 + i] = clip(configuration[4 + i], chain.lower[i], chain.upper[i])
