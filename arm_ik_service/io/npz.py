@@ -82,7 +82,7 @@ class NpzSession:
 
 def _integers(rows: Any, lowest: int = -FARTHEST) -> list[int]:
     """Numbers as the messages bound them."""
-    return np.clip(rows, lowest, FARTHEST).astype(np.int64).tolist()  # type: ignore[no-any-return]
+    return np.clip(rows.astype(np.int64), lowest, FARTHEST).tolist()  # type: ignore[no-any-return]
 
 
 def _device(device: str, rows: Mapping[str, Any]) -> Iterator[TrackedPose | None]:
@@ -91,15 +91,15 @@ def _device(device: str, rows: Mapping[str, Any]) -> Iterator[TrackedPose | None
     raw = np.asarray(rows[device], np.float64)
     poses, deserved = clean_poses(raw)
     if f"{device}_flags" in rows:
-        present = ~np.isnan(raw).all(axis=1)
+        absent = np.asarray(np.isnan(raw).all(axis=1))
+        present = [not row for row in absent.tolist()]
         flags = rows[f"{device}_flags"].astype(np.int64) & deserved
     else:
-        present = np.asarray(rows.get(f"{device}_valid", np.ones(len(raw))), bool)
+        present = [bool(valid) for valid in rows.get(f"{device}_valid", [True] * len(raw))]
         flags = deserved
     linear, angular = (_velocities(rows.get(f"{device}_{kind}_velocity"), len(raw)) for kind in ("linear", "angular"))
     tracked = to_tracked_poses(poses, flags, linear, angular)
-    there: list[bool] = present.tolist()
-    return (pose if is_there else None for pose, is_there in zip(tracked, there, strict=True))
+    return (pose if there else None for pose, there in zip(tracked, present, strict=True))
 
 
 def _velocities(rows: Any, count: int) -> list[Vector | None]:
@@ -123,7 +123,8 @@ def open_npz(path: Path) -> NpzSession:
             raise SessionError(f"{path}: the session holds no frames")
         columns = ["t", *(name for name in _TIMES if name in archive)]
         for name in columns[1:]:
-            _checked(archive, name, count, ())
+            if _checked(archive, name, count, ()).dtype.kind not in "iu":
+                raise SessionError(f"{path}: array `{name}` holds no integers")
         for device in (device for device in DEVICES if device in archive):
             _checked(archive, device, count, (7,))
             columns.append(device)

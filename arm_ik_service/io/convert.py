@@ -1,0 +1,82 @@
+"""One form of session into another: any readable recording into `.mcap` or `.npz`, frames and their times unchanged."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from arm_ik_service.errors import SessionError
+from arm_ik_service.io.npz import NpzSessionWriter
+from arm_ik_service.io.recording import RecordingWriter
+from arm_ik_service.io.session import RecordedFrame, Session
+
+Progress = Callable[[int], None]  # told how many more frames are done
+PROGRESS_EVERY = 512  # frames
+
+
+def convert_session(
+    session: Session, output: Path, *, avatar: str | None = None, progress: Progress | None = None
+) -> int:
+    """Write the frames of a session, of one avatar if named, as the file name asks; returns how many.
+
+    `.mcap` also takes the recorded answers and profiles along; `.npz` holds one person. Raises SessionError for
+    another ending, a name that is not in the session, or several people where one must be chosen.
+    """
+    if output.exists() and output.samefile(session.path):
+        raise SessionError(f"{output}: is the session itself; write to another file")
+    if avatar is not None and avatar not in session.avatars:
+        raise SessionError(f"{session.path}: no avatar {avatar!r}; it has {', '.join(session.avatars)}")
+    if output.suffix == ".mcap":
+        return _to_mcap(session, output, avatar, progress)
+    if output.suffix == ".npz":
+        return _to_npz(session, output, avatar, progress)
+    raise SessionError(f"{output}: a session can be written as .mcap or .npz")
+
+
+def _to_mcap(session: Session, output: Path, avatar: str | None, progress: Progress | None) -> int:
+    count = 0
+    metadata = {name: str(value) for name, value in session.metadata.items() if name != "format"}
+    answers = (answer for answer in session.arms() if avatar in (None, answer.avatar))
+    answer = next(answers, None)
+    with RecordingWriter(output, {"source": session.path.name, **metadata}) as writer:
+        for name in session.avatars:
+            if avatar in (None, name) and (profile := session.calibration(name)) is not None:
+                writer.write_calibration(name, profile, 0)
+        for count, recorded in enumerate(_chosen(session, avatar, progress), 1):
+            time_ns = _log_time_ns(recorded)
+            while answer is not None and answer.publish_time_ns < time_ns:
+                writer.write_arms(answer.avatar, answer, answer.publish_time_ns)
+                answer = next(answers, None)
+            writer.write_frame(recorded.avatar, recorded.frame, time_ns)
+        while answer is not None:
+            writer.write_arms(answer.avatar, answer, answer.publish_time_ns)
+            answer = next(answers, None)
+    return count
+
+
+def _to_npz(session: Session, output: Path, avatar: str | None, progress: Progress | None) -> int:
+    if avatar is None and len(session.avatars) > 1:
+        names = ", ".join(session.avatars)
+        raise SessionError(f"{session.path} holds {names}; .npz holds one person: choose one of them")
+    count = 0
+    writer = NpzSessionWriter(avatar or session.avatars[0])
+    for count, recorded in enumerate(_chosen(session, avatar, progress), 1):  # noqa: B007  used after the loop
+        writer.write(recorded)
+    writer.save(output)
+    return count
+
+
+def _chosen(session: Session, avatar: str | None, progress: Progress | None) -> Iterator[RecordedFrame]:
+    read = 0
+    for read, recorded in enumerate(session.frames(), 1):
+        if avatar in (None, recorded.avatar):
+            yield recorded
+        if progress is not None and read % PROGRESS_EVERY == 0:
+            progress(PROGRESS_EVERY)
+    if progress is not None and read % PROGRESS_EVERY:
+        progress(read % PROGRESS_EVERY)
+
+
+def _log_time_ns(recorded: RecordedFrame) -> int:
+    """Return when it was received, or the sample time, which is when it must have been."""
+    return recorded.frame.sample_time_ns if recorded.receive_time_ns is None else recorded.receive_time_ns
