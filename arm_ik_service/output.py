@@ -12,7 +12,7 @@ import numpy as np
 
 from arm_ik_service.compiled import Record, compiled, record_dtype
 from arm_ik_service.geometry import scalar as g
-from arm_ik_service.ik.state import LIMIT_NAMES
+from arm_ik_service.arm.model import LIMITS
 from arm_ik_service.wire.messages import (
     VERSION,
     ArmsState,
@@ -110,7 +110,7 @@ def _limits(mask: int) -> tuple[str, ...]:
     """Return the names of the set bits; each combination is built once."""
     names = _limit_tuples.get(mask)
     if names is None:
-        names = tuple(name for bit, name in enumerate(LIMIT_NAMES) if mask >> bit & 1)
+        names = tuple(name for bit, name in enumerate(LIMITS) if mask >> bit & 1)
         _limit_tuples[mask] = names
     return names
 

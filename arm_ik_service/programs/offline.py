@@ -5,12 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import islice
+from pathlib import Path
 
 import msgspec
 
 from arm_ik_service.avatar import Avatars
 from arm_ik_service.body.profile import Profile
+from arm_ik_service.errors import SessionError
+from arm_ik_service.io.recording import RecordingWriter
 from arm_ik_service.io.session import RecordedFrame, Session, as_served
+from arm_ik_service.io.solution import SolutionWriter
 from arm_ik_service.settings import Settings
 from arm_ik_service.tracking.state import ACCEPTED
 from arm_ik_service.wire.messages import ArmsState
@@ -71,11 +75,30 @@ def solve_frames(
             progress(len(block))
 
 
-def solve_session(
-    session: Session, profile: Profile | None, settings: Settings, progress: Progress | None = None
-) -> Iterator[tuple[RecordedFrame, ArmsState]]:
-    """Solve a whole recording. Without a profile the recorded one is used, or else a person of average stature."""
-    return solve_frames(session.frames(), profile or profile_in(session) or Profile(), settings, progress)
+def save_solution(
+    output: Path,
+    session: Session,
+    answers: Iterator[tuple[RecordedFrame, ArmsState]],
+    profile: Profile,
+    avatar: str | None = None,
+) -> int:
+    """Write answers as arrays (`.npz`) or as a recording (`.mcap`); returns how many. Raises SessionError."""
+    count = 0
+    if output.suffix == ".mcap":
+        with RecordingWriter(output) as writer:
+            for recorded, answer in answers:
+                writer.write_frame(recorded.avatar, recorded.frame, answer.receive_time_ns)
+                writer.write_arms(recorded.avatar, answer, answer.receive_time_ns)
+                count += 1
+        return count
+    if avatar is None and len(session.avatars) > 1:
+        names = ", ".join(session.avatars)
+        raise SessionError(f"{session.path} holds {names}; arrays are of one person: choose with --avatar")
+    arrays = SolutionWriter(profile.grip.left.position_m, profile.grip.right.position_m)
+    for _, answer in answers:
+        arrays.write(answer)
+    arrays.save(output)
+    return len(arrays)
 
 
 @dataclass

@@ -1,0 +1,56 @@
+"""`arm-ik view`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from arm_ik_service.cli.options import Connect, Listen, Scouting, ZenohConfig, bus_options, say, stopped_by_signals
+
+
+def view(
+    save: Annotated[Path | None, typer.Option("--save", metavar="FILE", help="Write an .rrd file.")] = None,
+    spawn: Annotated[bool, typer.Option("--spawn", help="Open the Rerun viewer (the default).")] = False,
+    web: Annotated[bool, typer.Option("--web", help="Serve the viewer to a web browser.")] = False,
+    connect_rerun: Annotated[
+        str | None, typer.Option("--connect-rerun", metavar="URL", help="Stream to a viewer that runs already.")
+    ] = None,
+    duration_s: Annotated[
+        float | None, typer.Option("--duration", metavar="SECONDS", min=0.1, help="Stop after so long.")
+    ] = None,
+    prefix: Annotated[str, typer.Option(help="Key prefix, as in the service's settings.")] = "",
+    connect: Connect = None,
+    listen: Listen = None,
+    scouting: Scouting = False,
+    zenoh_config: ZenohConfig = None,
+) -> None:
+    """Show everybody's arms in Rerun, until Ctrl-C. Several outputs may be given together.
+
+    Example: [bold]arm-ik view --save session.rrd --web[/bold]
+    """
+    from arm_ik_service.io.rerun_view import Connect as ConnectTo
+    from arm_ik_service.io.rerun_view import Save, Sink, Spawn, Web
+    from arm_ik_service.io.zenoh_bus import open_client
+    from arm_ik_service.programs.viewer import Viewer
+    from arm_ik_service.wire.keys import Keys
+
+    sinks: list[Sink] = []
+    if save is not None:
+        sinks.append(Save(save))
+    if web:
+        sinks.append(Web())
+    if connect_rerun is not None:
+        sinks.append(ConnectTo(connect_rerun))
+    if spawn or not sinks:
+        sinks.append(Spawn())
+    with open_client(bus_options(connect, listen, scouting, zenoh_config), waiting=say) as bus:
+        viewer = Viewer(bus, sinks, Keys(prefix))
+        for sink in sinks:
+            if isinstance(sink, Web):
+                say(f"view: open {sink.address} in a browser")
+        with stopped_by_signals(viewer.stop):
+            say("ready; Ctrl-C ends it")
+            viewer.run(duration_s)
+        say(viewer.close())
