@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from heapq import merge
+from operator import itemgetter
 from pathlib import Path
 
 from arm_ik_service.errors import SessionError
 from arm_ik_service.io.npz import NpzSessionWriter
 from arm_ik_service.io.recording import RecordingWriter
 from arm_ik_service.io.session import RecordedFrame, Session
+from arm_ik_service.wire.messages import ArmsState
 
 Progress = Callable[[int], None]  # told how many more frames are done
 PROGRESS_EVERY = 512  # frames
@@ -36,21 +39,19 @@ def convert_session(
 def _to_mcap(session: Session, output: Path, avatar: str | None, progress: Progress | None) -> int:
     count = 0
     metadata = {name: str(value) for name, value in session.metadata.items() if name != "format"}
-    answers = (answer for answer in session.arms() if avatar in (None, answer.avatar))
-    answer = next(answers, None)
+    frames = ((_log_time_ns(recorded), recorded) for recorded in _chosen(session, avatar, progress))
+    answers = ((answer.publish_time_ns, answer) for answer in session.arms() if avatar in (None, answer.avatar))
     with RecordingWriter(output, {"source": session.path.name, **metadata}) as writer:
-        for name in session.avatars:
-            if avatar in (None, name) and (profile := session.calibration(name)) is not None:
-                writer.write_calibration(name, profile, 0)
-        for count, recorded in enumerate(_chosen(session, avatar, progress), 1):
-            time_ns = _log_time_ns(recorded)
-            while answer is not None and answer.publish_time_ns < time_ns:
-                writer.write_arms(answer.avatar, answer, answer.publish_time_ns)
-                answer = next(answers, None)
-            writer.write_frame(recorded.avatar, recorded.frame, time_ns)
-        while answer is not None:
-            writer.write_arms(answer.avatar, answer, answer.publish_time_ns)
-            answer = next(answers, None)
+        for time_ns, message in merge(frames, answers, key=itemgetter(0)):
+            if writer.message_count == 0:
+                for name in session.avatars if avatar is None else (avatar,):
+                    if (profile := session.calibration(name)) is not None:
+                        writer.write_calibration(name, profile, time_ns)
+            if isinstance(message, ArmsState):
+                writer.write_arms(message.avatar, message, time_ns)
+            else:
+                writer.write_frame(message.avatar, message.frame, time_ns)
+                count += 1
     return count
 
 
@@ -58,12 +59,11 @@ def _to_npz(session: Session, output: Path, avatar: str | None, progress: Progre
     if avatar is None and len(session.avatars) > 1:
         names = ", ".join(session.avatars)
         raise SessionError(f"{session.path} holds {names}; .npz holds one person: choose one of them")
-    count = 0
     writer = NpzSessionWriter(avatar or session.avatars[0])
-    for count, recorded in enumerate(_chosen(session, avatar, progress), 1):  # noqa: B007  used after the loop
+    for recorded in _chosen(session, avatar, progress):
         writer.write(recorded)
     writer.save(output)
-    return count
+    return len(writer)
 
 
 def _chosen(session: Session, avatar: str | None, progress: Progress | None) -> Iterator[RecordedFrame]:

@@ -185,6 +185,9 @@ class NpzSessionWriter:
             fields += [(f"{device}_{kind}_velocity", np.float64, (3,)) for kind in ("linear", "angular")]
         self._table = Table(fields)
 
+    def __len__(self) -> int:
+        return len(self._table)
+
     def write(self, recorded: RecordedFrame) -> None:
         """Add a frame; `t` counts from the first one."""
         frame, receive_ns = recorded.frame, recorded.receive_time_ns
