@@ -41,7 +41,8 @@ def _to_mcap(session: Session, output: Path, avatar: str | None, progress: Progr
     count = 0
     metadata = {name: str(value) for name, value in session.metadata.items() if name != "format"}
     frames: Messages = ((_log_time_ns(recorded), recorded) for recorded in _chosen(session, avatar, progress))
-    answers: Messages = ((answer.publish_time_ns, answer) for answer in session.arms() if avatar in (None, answer.avatar))
+    recorded_answers = (answer for answer in session.arms() if avatar in (None, answer.avatar))
+    answers: Messages = ((answer.publish_time_ns, answer) for answer in recorded_answers)
     with RecordingWriter(output, {"source": session.path.name, **metadata}) as writer:
         for time_ns, message in merge(frames, answers, key=itemgetter(0)):
             if writer.message_count == 0:
@@ -72,8 +73,7 @@ def _chosen(session: Session, avatar: str | None, progress: Progress | None) -> 
     for read, recorded in enumerate(session.frames(), 1):
         if avatar in (None, recorded.avatar):
             yield recorded
-        if progress is not None and read % Messages = Iterator[tuple[int, RecordedFrame | ArmsState]]  # by the time of each
-PROGRESS_EVERY == 0:
+        if progress is not None and read % PROGRESS_EVERY == 0:
             progress(PROGRESS_EVERY)
     if progress is not None and read % PROGRESS_EVERY:
         progress(read % PROGRESS_EVERY)
