@@ -86,7 +86,13 @@ class Avatars:
         if models is None:
             body = profile.body
             left, right = (
-                ArmModel.load(side=side, upper_arm_m=body.upper_arm, forearm_m=body.forearm, hand_m=body.hand)
+                ArmModel.load(
+                    side=side,
+                    upper_arm_m=body.upper_arm,
+                    forearm_m=body.forearm,
+                    hand_m=body.hand,
+                    limits=profile.limits_deg.in_radians(),
+                )
                 for side in SIDES
             )
             models = self._models[profile] = (left, right)

@@ -30,7 +30,7 @@ ROOMS: dict[str, set[str]] = {
 EVERYTHING = {"programs", "cli", "__init__", "__main__"}  # these put the rest together
 
 # a library that only one kind of module may import
-OWNERS = {
+OWNERS: dict[str, str | tuple[str, ...]] = {
     "zenoh": "io.zenoh_",
     "rerun": "io.rerun_view",
     "mcap": "io.recording",

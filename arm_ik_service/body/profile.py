@@ -7,6 +7,7 @@ Control of Human Movement, table 4.1.
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated
 
@@ -68,11 +69,42 @@ class Grips(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     right: GripOffset = GripOffset((0.0, -0.02, -0.075), (0.5, 0.5, 0.5, 0.5))
 
 
+Range = tuple[float, float]
+
+
+class RangesOfMotion(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+    """Joint ranges of one person [degrees], lower and upper; None keeps the model's. Signs: models/README.md."""
+
+    shoulder_twist: Range | None = None
+    elbow_flexion: Range | None = None
+    elbow_carrying: Range | None = None
+    pronation: Range | None = None
+    wrist_flexion: Range | None = None
+    wrist_deviation: Range | None = None
+    wrist_axial: Range | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse a range that is upside down, by name."""
+        for name, limits in self.stated():
+            if not -180.0 <= limits[0] <= limits[1] <= 180.0:
+                raise ValueError(f"{name} = [{limits[0]:g}, {limits[1]:g}]: lower must not be above upper, in -180..180")
+
+    def stated(self) -> list[tuple[str, Range]]:
+        """Return the ranges that are given."""
+        every = ((name, getattr(self, name)) for name in self.__struct_fields__)
+        return [(name, limits) for name, limits in every if limits is not None]
+
+    def in_radians(self) -> dict[str, Range]:
+        """Return the given ranges as ArmModel.load takes them [rad]."""
+        return {name: (math.radians(lower), math.radians(upper)) for name, (lower, upper) in self.stated()}
+
+
 class Profile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """One person, calibrated or assumed."""
 
     body: BodyMeasures = BodyMeasures()
     grip: Grips = Grips()
+    limits_deg: RangesOfMotion = RangesOfMotion()
 
 
 def load_profile(path: Path | None) -> Profile:

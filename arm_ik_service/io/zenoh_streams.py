@@ -30,6 +30,12 @@ def declare_stream(bus: Bus, key: str, encoding: Encoding) -> Stream:
     )
 
 
+def has_listener(stream: Stream) -> bool:
+    """Whether anybody subscribes to what the stream publishes."""
+    status: Any = stream.matching_status  # its type stubs say bool, the library returns an object
+    return bool(getattr(status, "matching", status))
+
+
 def put_once(bus: Bus, key: str, payload: bytes, encoding: Encoding) -> None:
     """Publish something that does not come again soon: it waits for room rather than be dropped."""
     bus.put(

@@ -40,7 +40,7 @@ class Recorder:
         self._queue: SimpleQueue[tuple[str, str, bytes, int]] = SimpleQueue()
         self._described: set[str] = set()
         self._recorded = Recorded()
-        self._writer = RecordingWriter(path)
+        self._writer = RecordingWriter(path, keys=keys)
         self._subscribers = [
             subscribe(bus, key, lambda *arrival, kind=kind: self._queue.put((kind, *arrival)))
             for kind, key in (("controllers", keys.controllers()), ("arms", keys.arms()))

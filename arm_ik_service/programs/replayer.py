@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from threading import Event
 
 from arm_ik_service.io.session import RecordedFrame, Session
-from arm_ik_service.io.zenoh_streams import Bus, Stream, declare_stream
+from arm_ik_service.io.zenoh_streams import Bus, Stream, declare_stream, has_listener
 from arm_ik_service.wire import codec
 from arm_ik_service.wire.keys import Keys
 from arm_ik_service.wire.messages import ControllerFrame, Encoding
@@ -139,7 +139,7 @@ class Replayer:
             key = self._keys.controllers(avatar)
             publisher = self._publishers[avatar] = declare_stream(self._bus, key, self._options.encoding)
             give_up_s = time.monotonic() + FIRST_WAIT_S
-            while not publisher.matching_status.matching and not self._stopped.wait(0.01):
+            while not has_listener(publisher) and not self._stopped.wait(0.01):
                 if time.monotonic() > give_up_s:
                     if self._warn is not None:
                         self._warn(f"nobody listens on {key}: is `arm-ik serve` running? playing all the same")

@@ -19,9 +19,9 @@ from arm_ik_service.avatar import Avatars
 from arm_ik_service.body.profile import Profile
 from arm_ik_service.errors import DecodeError, VersionError
 from arm_ik_service.io.zenoh_inbox import Arrival, Inbox
-from arm_ik_service.io.zenoh_streams import Bus, Stream, answer_queries, announce, declare_stream, put_once
-from arm_ik_service.skeleton import skeleton_of
+from arm_ik_service.io.zenoh_streams import Bus, Stream, announce, answer_queries, declare_stream, put_once
 from arm_ik_service.settings import Settings
+from arm_ik_service.skeleton import skeleton_of
 from arm_ik_service.tracking.state import ACCEPTED, REFUSALS
 from arm_ik_service.wire import codec
 from arm_ik_service.wire.keys import Keys
