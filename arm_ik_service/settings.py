@@ -23,7 +23,10 @@ class TrackingSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     # what to do with poses that are valid but not tracked (dead-reckoned), and with none at all
     dead_reckoning: Literal["freeze", "follow", "fade_to_rest"] = "freeze"
-    lost_after_s: float = 1.0  # without good data a device is held, after this long it is lost
+    lost_after_s: Annotated[float, Meta(ge=0.0)] = 1.0  # without good data a device is held, after this long it is lost
+    reacquire_m_s: Annotated[float, Meta(gt=0.0)] = 12.0  # speed of the way back to good data, added to the data's own:
+    reacquire_rad_s: Annotated[float, Meta(gt=0.0)] = 40.0  # 0.9 m and half a turn take 0.12 s; at the least it is 0.04
+    smoothing: Literal["off", "light", "strong"] = "light"  # trails by 0, 1.1 or 8 mm: at 2 m/s by 0, 0.5 or 4 ms
 
 
 class BodySettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -34,6 +37,15 @@ class BodySettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 class SolverSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """One arm, target to configuration."""
+
+    iterations: Annotated[int, Meta(ge=1, le=10_000)] = 32  # a frame's budget: 0.3 us each
+    time_limit_us: Annotated[float, Meta(ge=0.0)] = 0.0  # of one arm's frame; 0: iterations alone bound it
+    position_tolerance_m: Annotated[float, Meta(gt=0.0)] = 5e-4
+    orientation_tolerance_rad: Annotated[float, Meta(gt=0.0)] = 5e-3
+    # the lever on which a radian of hand rotation weighs as much as a metre of position: a hand's length and a bit
+    rotation_weight_m: Annotated[float, Meta(gt=0.0)] = 0.14
+    swivel_speed_rad_s: Annotated[float, Meta(ge=0.0)] = 7.0  # the elbow about the arm's line, for comfort alone
+    swivel_time_s: Annotated[float, Meta(ge=0.0)] = 0.03  # in which it covers most of the way to the comfortable place
 
 
 class ServiceSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -17,6 +17,7 @@ from arm_ik_service.arm.chain import CHAIN, columns_of, forward_poses
 from arm_ik_service.arm.limits import clamp_hinges, clamp_swing, clamp_twist, swing_excess, twist_excess, twist_of
 from arm_ik_service.compiled import compiled
 from arm_ik_service.errors import ModelError
+from arm_ik_service.geometry.batch import log
 from arm_ik_service.geometry.scalar import scale
 from arm_ik_service.resources import resource_folder
 from arm_ik_service.wire.messages import SIDES, Side
@@ -107,6 +108,18 @@ class ArmModel:
         return float(self.chains[0].twist_lower), float(self.chains[0].twist_upper)
 
     @property
+    def swing_range(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Extremes [rad] of shoulder flexion and of shoulder abduction in the swing region, each over all of the other."""
+        azimuth = np.linspace(-np.pi, np.pi, 721)
+        angle = np.clip(self._edge(azimuth), 0.0, np.pi - 1e-6)
+        hinges = (np.zeros_like(angle),) * 7
+        directions = self.configurations_at(angle, azimuth, *hinges)
+        vectors = log(directions[:, :4])
+        # the region holds the straight-up arm, which every direction of swing reaches at half a turn
+        flexion, abduction = vectors[:, 2], -vectors[:, 0]
+        return (float(flexion.min()), math.pi), (float(abduction.min()), math.pi)
+
+    @property
     def speed_limit(self) -> Array:
         """Joint speed limits (9,) [rad/s], tangent order."""
         return np.array(self.chains["speed_limit"][0])
@@ -138,12 +151,15 @@ class ArmModel:
         _excess_rows(self.chains, q.reshape(-1, 10), out.reshape(-1, 8))
         return out
 
+    def _edge(self, azimuth: Array) -> Array:
+        """Angle [rad] from the swing centre to the edge of the region at azimuths [rad]."""
+        chain, k = self.chains[0], np.arange(5)[:, None]
+        return np.asarray(chain.swing_cosines @ np.cos(k * azimuth) + chain.swing_sines @ np.sin(k * azimuth))
+
     def random_configurations(self, count: int, rng: np.random.Generator, share: float = 1.0) -> Array:
         """Draw configurations (count, 10) uniformly from the middle `share` of every range, swing region included."""
-        chain = self.chains[0]
         azimuth = rng.uniform(-np.pi, np.pi, count)
-        k = np.arange(5)[:, None]
-        edge = chain.swing_cosines @ np.cos(k * azimuth) + chain.swing_sines @ np.sin(k * azimuth)
+        edge = self._edge(azimuth)
         return self.configurations_at(
             np.sqrt(rng.uniform(0.0, 1.0, count)) * share * edge,
             azimuth,

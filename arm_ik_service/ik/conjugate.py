@@ -39,13 +39,13 @@ from arm_ik_service.compiled import Record, compiled, record_dtype
 from arm_ik_service.geometry.scalar import (
     Vector,
     add,
+    conjugate,
     cross,
     dot,
     exp,
     from_columns,
     log,
     multiply,
-    conjugate,
     normalized,
     scale,
     subtract,
@@ -91,7 +91,7 @@ def rotation_error(current: Columns, wanted: Columns) -> Vector:
 
 
 @compiled
-def _project(step: Any, inverse: Any, normal: Vector) -> None:
+def project(step: Any, inverse: Any, normal: Vector) -> None:
     """Remove from the shoulder part of a step what moves along `normal`, orthogonally in the metric 1 / inverse."""
     n0, n1, n2 = inverse[0] * normal[0], inverse[1] * normal[1], inverse[2] * normal[2]
     s = (step[0] * normal[0] + step[1] * normal[1] + step[2] * normal[2]) / (
@@ -103,7 +103,7 @@ def _project(step: Any, inverse: Any, normal: Vector) -> None:
 
 
 @compiled
-def _independent(normal: Vector, of: Vector, inverse: Any) -> Vector:
+def independent(normal: Vector, of: Vector, inverse: Any) -> Vector:
     """Part of `normal` whose projection leaves the projection along `of` alone."""
     w = (inverse[0] * of[0], inverse[1] * of[1], inverse[2] * of[2])
     return subtract(normal, scale(dot(normal, w) / dot(of, w), of))
@@ -122,7 +122,7 @@ def hold_limits(chain: Record, configuration: Any, base: Columns, step: Any, inv
     if swing_excess(chain, scale(-1.0, base[1])) > -AT_LIMIT:
         swing = swing_gradient(chain, base)
         if swing[0] * step[0] + swing[2] * step[2] > 0.0:
-            _project(step, inverse, swing)
+            project(step, inverse, swing)
             held |= 1
     twist, height = twist_of(base), -base[1][1]
     over = twist_excess(chain, twist + AT_LIMIT, height)
@@ -134,8 +134,8 @@ def hold_limits(chain: Record, configuration: Any, base: Columns, step: Any, inv
             normal = scale(-1.0, normal)
         if normal[0] * step[0] + normal[1] * step[1] + normal[2] * step[2] > 0.0:
             if held & 1:
-                normal = _independent(normal, swing, inverse)
-            _project(step, inverse, normal)
+                normal = independent(normal, swing, inverse)
+            project(step, inverse, normal)
             held |= 2
     return held
 
@@ -185,7 +185,10 @@ def converge(
         e_pos, e_rot = subtract(position, r0), rotation_error(hand, rotation)
         p2, o2 = dot(e_pos, e_pos), dot(e_rot, e_rot)
         error = p2 + lam * o2
-        if p2 < position_tolerance_m * position_tolerance_m and o2 < orientation_tolerance_rad * orientation_tolerance_rad:
+        if (
+            p2 < position_tolerance_m * position_tolerance_m
+            and o2 < orientation_tolerance_rad * orientation_tolerance_rad
+        ):
             status = SOLVED
             break
         if error > best:  # the last step made it worse: take it back, and go a quarter as far
@@ -247,9 +250,9 @@ def converge(
             for i in range(9):
                 direction[i] = step[i]
 
-        spin0 = _combine(direction[0], base[0], direction[1], base[1], direction[2], base[2])
-        spin1 = _combine(direction[3], base[2], direction[4], x1, direction[5], y1)
-        spin2 = _combine(direction[6], lower[2], direction[7], x2, direction[8], y2)
+        spin0 = combine(direction[0], base[0], direction[1], base[1], direction[2], base[2])
+        spin1 = combine(direction[3], base[2], direction[4], x1, direction[5], y1)
+        spin2 = combine(direction[6], lower[2], direction[7], x2, direction[8], y2)
         velocity = add(cross(spin0, r0), cross(spin1, r1))
         spin = add(add(spin0, spin1), spin2)
         length = (dot(velocity, e_pos) + lam * dot(spin, e_rot)) / (
@@ -270,7 +273,8 @@ def converge(
 
 
 @compiled
-def _combine(a: float, x: Vector, b: float, y: Vector, c: float, z: Vector) -> Vector:
+def combine(a: float, x: Vector, b: float, y: Vector, c: float, z: Vector) -> Vector:
+    """a x + b y + c z."""
     return (
         a * x[0] + b * y[0] + c * z[0],
         a * x[1] + b * y[1] + c * z[1],

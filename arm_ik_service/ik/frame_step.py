@@ -1,0 +1,156 @@
+"""One frame of one arm: from where it was, to the new target, with the elbow drawn to where it is comfortable.
+
+1. The elbow's swivel turns towards comfort, at most as fast as a stated bound.
+2. `converge` brings the hand onto the target.
+3. A hand that is stuck short of its target although some other swivel could meet it (a limit in the way) starts again
+   from the closed form at the nearest such swivel, within the same budget.
+4. A target that limits or reach forbid: the position first. The loop goes on from where it stopped with the rotation
+   weighing a hundred times less.
+"""
+
+from __future__ import annotations
+
+import math
+
+from arm_ik_service.arm.chain import Columns, columns_of
+from arm_ik_service.arm.limits import clamp_swing, clamp_twist
+from arm_ik_service.compiled import Record, compiled
+from arm_ik_service.geometry.scalar import Vector, clip, exp, multiply, scale
+from arm_ik_service.ik.clock import monotonic_ns
+from arm_ik_service.ik.comfort import discomfort, slope_and_curvature
+from arm_ik_service.ik.conjugate import NEAREST, OUT_OF_TIME, SOLVED, converge
+from arm_ik_service.ik.swivel import Reach, posture_at, reach_to, swivel_of, take, violation
+
+SEEDS = 24  # swivels looked at when there is no good start: every 15 degrees
+FLAT = 0.3  # curvature below which discomfort counts as flat: Newton's step would be too long
+HALF_SURE = 1.0  # curvature at which the elbow's confidence is one half
+STUCK_M, STUCK_RAD = 2e-3, 0.02  # a hand further off than this is worth another start
+POSITION_FIRST = 0.01  # share of the rotation's weight that is left once the target is known to be out of reach
+_NEARNESS = 0.02  # [1/rad] what a far swivel must gain to be preferred to a near one
+_BETTER = 0.5  # a new start must at least halve the error: no alternation between two that are as good
+
+
+@compiled
+def turn_to_comfort(arm: Record, settings: Record, reach: Reach, rotation: Columns, dt_s: float) -> None:
+    """Swing the arm about the line from shoulder to wrist towards less discomfort, within the speed bound."""
+    chain, q = arm.chain, arm.configuration
+    shoulder = (q[0], q[1], q[2], q[3])
+    swivel = swivel_of(reach, columns_of(shoulder))
+    slope, curvature = slope_and_curvature(arm.comfort, chain, reach, rotation, swivel)
+    arm.elbow_confidence = max(curvature, 0.0) / (max(curvature, 0.0) + HALF_SURE)
+    share = 1.0 - math.exp(-dt_s / settings.swivel_time_s) if settings.swivel_time_s > 0.0 else 1.0
+    most = settings.swivel_speed_rad_s * dt_s
+    turn = clip(-share * slope / max(abs(curvature), FLAT), -most, most)
+    shoulder = multiply(exp(scale(turn, reach[0][0])), shoulder)
+    shoulder = clamp_swing(chain, shoulder, columns_of(shoulder))
+    shoulder = clamp_twist(chain, shoulder, columns_of(shoulder))
+    for i in range(4):
+        q[i] = shoulder[i]
+
+
+@compiled
+def most_comfortable(arm: Record, reach: Reach, rotation: Columns) -> float:
+    """Return the swivel of least discomfort, all around."""
+    best, least = 0.0, math.inf
+    for i in range(SEEDS):
+        swivel = (i - SEEDS // 2) * (2.0 * math.pi / SEEDS)
+        cost = discomfort(arm.comfort, arm.chain, posture_at(reach, rotation, swivel))
+        if cost < least:
+            best, least = swivel, cost
+    return best
+
+
+@compiled
+def nearest_possible(chain: Record, reach: Reach, rotation: Columns, swivel: float) -> float:
+    """Return the swivel nearest to a given one at which the limits are kept, or least broken."""
+    best, least = swivel, math.inf
+    for i in range(SEEDS):
+        step = (i - SEEDS // 2) * (2.0 * math.pi / SEEDS)
+        cost = violation(chain, posture_at(reach, rotation, swivel + step), 0.0) + _NEARNESS * abs(step)
+        if cost < least:
+            best, least = swivel + step, cost
+    return best
+
+
+@compiled
+def _converge(
+    arm: Record, settings: Record, position: Vector, rotation: Columns, budget: int, share: float, deadline: int
+) -> int:
+    lam = share * settings.rotation_weight_m * settings.rotation_weight_m
+    return converge(
+        arm.chain,
+        arm.work,
+        arm.configuration,
+        position,
+        rotation,
+        budget,
+        lam,
+        settings.position_tolerance_m,
+        settings.orientation_tolerance_rad,
+        deadline,
+    )
+
+
+@compiled
+def reach_target(arm: Record, settings: Record, position: Vector, rotation: Columns, reach: Reach) -> None:
+    """Bring the hand onto the target from the configuration at hand: steps 2 to 4. Leaves the outcome in `arm`."""
+    arm.restarted = 0
+    chain, work, q, kept = arm.chain, arm.work, arm.configuration, arm.kept
+    deadline = 0
+    if settings.time_limit_us > 0.0:
+        deadline = monotonic_ns() + int(1e3 * settings.time_limit_us)
+    budget = settings.iterations
+    status = _converge(arm, settings, position, rotation, budget, 1.0, deadline)
+    used = work.iterations
+    if status == SOLVED or status == OUT_OF_TIME:
+        arm.status = status
+        return
+
+    if work.position_error_m > STUCK_M or work.orientation_error_rad > STUCK_RAD:
+        lam = settings.rotation_weight_m * settings.rotation_weight_m
+        before = work.position_error_m**2 + lam * work.orientation_error_rad**2
+        position_error, orientation_error, held = work.position_error_m, work.orientation_error_rad, work.held
+        for i in range(10):
+            kept[i] = q[i]
+        swivel = swivel_of(reach, columns_of((q[0], q[1], q[2], q[3])))
+        take(chain, posture_at(reach, rotation, nearest_possible(chain, reach, rotation, swivel)), q)
+        clamped = clamp_swing(chain, (q[0], q[1], q[2], q[3]), columns_of((q[0], q[1], q[2], q[3])))
+        clamped = clamp_twist(chain, clamped, columns_of(clamped))
+        for i in range(4):
+            q[i] = clamped[i]
+        again = _converge(arm, settings, position, rotation, max(budget - used, 0), 1.0, deadline)
+        used += work.iterations
+        after = work.position_error_m**2 + lam * work.orientation_error_rad**2
+        if after < _BETTER * before:
+            status = again
+            arm.restarted = 1
+        else:
+            for i in range(10):
+                q[i] = kept[i]
+            work.position_error_m, work.orientation_error_rad, work.held = position_error, orientation_error, held
+
+    if status == NEAREST and work.position_error_m > settings.position_tolerance_m:
+        _converge(arm, settings, position, rotation, max(budget - used, 0), POSITION_FIRST, deadline)
+        used += work.iterations
+    work.iterations = used
+    arm.status = status
+
+
+@compiled
+def step_frame(arm: Record, settings: Record, position: Vector, rotation: Columns, dt_s: float) -> None:
+    """Take one frame: `position` and `rotation` of the hand bone, right arm, ISB axes."""
+    reach = reach_to(arm.chain, position)
+    turn_to_comfort(arm, settings, reach, rotation, dt_s)
+    reach_target(arm, settings, position, rotation, reach)
+
+
+@compiled
+def first_frame(arm: Record, settings: Record, position: Vector, rotation: Columns) -> None:
+    """Take a frame without a past: start at the most comfortable swivel."""
+    reach = reach_to(arm.chain, position)
+    take(
+        arm.chain,
+        posture_at(reach, rotation, most_comfortable(arm, reach, rotation)),
+        arm.configuration,
+    )
+    reach_target(arm, settings, position, rotation, reach)

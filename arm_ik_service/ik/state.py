@@ -1,0 +1,64 @@
+"""One arm in time: the record that the solve keeps from frame to frame and leaves its answer in."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from arm_ik_service.arm.chain import CHAIN
+from arm_ik_service.arm.model import ArmModel
+from arm_ik_service.compiled import Record, record_dtype
+from arm_ik_service.ik.comfort import COMFORT
+from arm_ik_service.ik.conjugate import WORK
+
+ARM = record_dtype(
+    [
+        ("chain", CHAIN),
+        ("comfort", np.float64, (len(COMFORT),)),
+        ("work", WORK),
+        # memory
+        ("started", np.int64),  # frames since the arm was at rest: 0, 1 or 2
+        ("before", np.float64, (10,)),  # configuration one frame ago
+        ("recent_velocity", np.float64, (9,)),  # mean over the last frame
+        ("kept", np.float64, (10,)),  # the best so far while another start is tried
+        # the answer; positions and rotations in the shoulder frame of the arm's own side
+        ("configuration", np.float64, (10,)),
+        ("velocity", np.float64, (9,)),  # [rad/s], tangent order
+        ("angles", np.float64, (9,)),  # arm.model.ANGLES [rad]
+        ("angle_rates", np.float64, (9,)),  # [rad/s]
+        ("isb", np.float64, (3,)),  # plane of elevation, elevation, axial rotation [rad]
+        ("isb_singular", np.int64),
+        ("elbow", np.float64, (3,)),
+        ("wrist", np.float64, (3,)),
+        ("upper_arm_rotation", np.float64, (4,)),  # ISB bone axes
+        ("forearm_rotation", np.float64, (4,)),
+        ("hand_rotation", np.float64, (4,)),  # OpenXR wrist frame
+        ("position_error_m", np.float64),
+        ("orientation_error_rad", np.float64),
+        ("elbow_confidence", np.float64),  # 0: any swivel is as comfortable; 1: the comfort is sharp
+        ("iterations", np.int64),
+        ("limits", np.int64),  # bit i: the arm rests on arm.model.LIMITS[i]
+        ("status", np.int64),  # ik.solver.Status
+        ("restarted", np.int64),  # 1 where this frame was solved from a new start: the elbow may have jumped
+    ]
+)
+
+
+def initialise_arm(arm: Record, model: ArmModel) -> None:
+    """Put an ARM record of a person's arm at rest, without a past."""
+    arm["started"] = 0
+    arm["chain"] = model.chains[0]
+    arm["comfort"] = list(COMFORT.values())
+    arm["configuration"] = model.rest
+    arm["before"] = model.rest
+    arm["velocity"] = 0.0
+    arm["recent_velocity"] = 0.0
+
+
+def new_arm(model: ArmModel) -> npt.NDArray[Any]:
+    """Return an array of one ARM record, at rest."""
+    arms = np.zeros(1, ARM)
+    initialise_arm(arms[0], model)
+    return arms

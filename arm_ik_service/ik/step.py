@@ -1,0 +1,116 @@
+"""The stage of the solve: a target record in, one ARM record moved on by a frame, with velocity, angles and bones."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from arm_ik_service.arm.angles import isb_shoulder, joint_angles
+from arm_ik_service.arm.chain import (
+    bone_from_arm,
+    columns_of,
+    forward,
+    hand_from_arm,
+    hand_to_arm,
+    position_from_arm,
+    position_to_arm,
+    spin_to_arm,
+)
+from arm_ik_service.arm.limits import swing_excess, twist_excess, twist_of
+from arm_ik_service.compiled import Record, compiled
+from arm_ik_service.geometry.scalar import clip, quaternion, scale, store, vector
+from arm_ik_service.ik.conjugate import AT_LIMIT, move
+from arm_ik_service.ik.frame_step import first_frame, step_frame
+from arm_ik_service.ik.state import ARM, initialise_arm
+from arm_ik_service.ik.velocity import SPEED_BIT, difference, velocity_from_twist
+
+MIN_DT_S, MAX_DT_S = 1e-3, 0.1  # a frame's time outside this says nothing about speed
+
+
+@compiled
+def step_arm(arm: Record, target: Record, dt_s: float, settings: Record) -> None:
+    """Move one arm on to a TARGET (position, rotation, linear_velocity, angular_velocity in the shoulder frame).
+
+    `dt_s` is the time since the last frame. Never fails: what cannot be met is met as nearly as can be.
+    """
+    chain, q = arm.chain, arm.configuration
+    dt_s = clip(dt_s, MIN_DT_S, MAX_DT_S)
+    position = position_to_arm(chain, vector(target.position))
+    rotation = columns_of(hand_to_arm(chain, quaternion(target.rotation)))
+    for i in range(10):
+        arm.before[i] = q[i]
+    if arm.started == 0:
+        first_frame(arm, settings, position, rotation)
+    else:
+        step_frame(arm, settings, position, rotation, dt_s)
+    linear = position_to_arm(chain, vector(target.linear_velocity))
+    angular = spin_to_arm(chain, vector(target.angular_velocity))
+    _move_on(arm, settings, linear, angular, dt_s)
+    _show(arm)
+
+
+@compiled
+def _move_on(arm: Record, settings: Record, linear: Any, angular: Any, dt_s: float) -> None:
+    """Find the joint velocity: recent motion carried on to now, corrected by the hand's twist, scaled to speed limits."""
+    chain, velocity, recent, step = arm.chain, arm.velocity, arm.recent_velocity, arm.work.direction
+    if arm.started == 0 or arm.restarted == 1:  # a jump is no motion
+        for i in range(9):
+            velocity[i] = 0.0
+        arm.started = 1
+    else:
+        difference(arm.before, arm.configuration, dt_s, step)
+        # the mean over the last frame is half a frame old
+        for i in range(9):
+            velocity[i] = step[i] + (0.5 * (step[i] - recent[i]) if arm.started == 2 else 0.0)
+            recent[i] = step[i]
+        arm.started = 2
+    lam = settings.rotation_weight_m * settings.rotation_weight_m
+    velocity_from_twist(chain, arm.work, arm.configuration, linear, angular, lam, velocity)
+    share = 1.0
+    for i in range(9):
+        share = min(share, chain.speed_limit[i] / max(abs(velocity[i]), 1e-9))
+    for i in range(9):
+        velocity[i] *= share
+    arm.limits = limits_at(chain, arm.configuration) | (SPEED_BIT if share < 1.0 else 0)
+
+
+@compiled
+def limits_at(chain: Record, configuration: Any) -> int:
+    """Bit mask over arm.model.LIMITS of the limits that a configuration (10,) rests on."""
+    bone = columns_of((configuration[0], configuration[1], configuration[2], configuration[3]))
+    twist, height = twist_of(bone), -bone[1][1]
+    mask = 1 if swing_excess(chain, scale(-1.0, bone[1])) > -AT_LIMIT else 0
+    if twist_excess(chain, twist + AT_LIMIT, height) > 0.0 or twist_excess(chain, twist - AT_LIMIT, height) < 0.0:
+        mask |= 2
+    for i in range(6):
+        angle = configuration[4 + i]
+        if angle <= chain.lower[i] + AT_LIMIT or angle >= chain.upper[i] - AT_LIMIT:
+            mask |= 4 << i
+    return mask
+
+
+@compiled
+def _show(arm: Record) -> None:
+    """Fill what is read off the configuration."""
+    chain, work = arm.chain, arm.work
+    elbow, wrist, upper, lower, hand = forward(chain, arm.configuration)
+    store(arm.elbow, position_from_arm(chain, elbow))
+    store(arm.wrist, position_from_arm(chain, wrist))
+    store(arm.upper_arm_rotation, bone_from_arm(chain, upper))
+    store(arm.forearm_rotation, bone_from_arm(chain, lower))
+    store(arm.hand_rotation, hand_from_arm(chain, hand))
+    joint_angles(arm.configuration, arm.velocity, arm.angles, arm.angle_rates)
+    arm.isb_singular = isb_shoulder(arm.configuration, arm.isb)
+    arm.iterations = work.iterations
+    arm.position_error_m = work.position_error_m
+    arm.orientation_error_rad = work.orientation_error_rad
+
+
+@compiled
+def predict(arm: Record, ahead_s: float, configuration: Any) -> None:
+    """Write the configuration (10,) that the arm's velocity leads to in `ahead_s`, inside the limits."""
+    for i in range(10):
+        configuration[i] = arm.configuration[i]
+    move(arm.chain, configuration, arm.velocity, ahead_s)
+
+
+__all__ = ["ARM", "initialise_arm", "limits_at", "predict", "step_arm"]
