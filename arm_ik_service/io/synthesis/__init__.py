@@ -2,12 +2,14 @@
 
     python -m arm_ik_service.io.synthesis replay_logs/
 
-`scenes` says what is done, `motion` how a person gets from one posture to the next, `person` where head and hands are
-in a posture, and `sensors` what a headset makes of that. All of it but writing the files is pure.
+`scenes` lists them; each has a module that says what is done in it. `motion` is how a person gets from one posture to
+the next, `person` where head and hands are in a posture, `sensors` what a headset makes of that. All of it but writing
+the files is pure.
 """
 
 from __future__ import annotations
 
-from arm_ik_service.io.synthesis.scenes import SCENES, Scene
+from arm_ik_service.io.synthesis.scene import Scene
+from arm_ik_service.io.synthesis.scenes import SCENES
 
 __all__ = ["SCENES", "Scene"]

@@ -9,7 +9,8 @@ import msgspec
 
 from arm_ik_service.io.recording import RecordingWriter
 from arm_ik_service.io.synthesis.person import STATURE_M
-from arm_ik_service.io.synthesis.scenes import SCENES, Scene
+from arm_ik_service.io.synthesis.scene import Scene
+from arm_ik_service.io.synthesis.scenes import SCENES
 
 
 def write_scene(scene: Scene, folder: Path) -> Path:
