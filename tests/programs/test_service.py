@@ -111,8 +111,10 @@ def hostile_payloads(count: int) -> list[bytes]:
 def test_ten_thousand_hostile_payloads_are_counted_and_cost_another_avatar_nothing(service: Service) -> None:
     good, hostile = service.stream("good"), service.stream("hostile")
     payloads = hostile_payloads(10_000)
-    for payload in payloads[:500]:
+    for n, payload in enumerate(payloads):  # once before it is measured: Zenoh's own buffers grow to their size
         hostile.put(payload)
+        if n % 50 == 0:
+            time.sleep(0.005)
     time.sleep(1.0)
     before_kib = service.memory_kib()
     each = len(payloads) // 200
@@ -127,7 +129,7 @@ def test_ten_thousand_hostile_payloads_are_counted_and_cost_another_avatar_nothi
     health = service.healths[-1]
     assert {"malformed", "too_large"} <= set(health.refused)
     assert service.process.popen.poll() is None
-    assert service.memory_kib() - before_kib < 8_192
+    assert service.memory_kib() - before_kib < 2_048
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
