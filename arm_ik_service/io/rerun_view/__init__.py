@@ -7,8 +7,21 @@ write_picture         a moment of an .rrd as a .png, without a display
 Save Spawn Connect Web   where a view can go
 """
 
+from arm_ik_service.io.rerun_view.live import LiveView
 from arm_ik_service.io.rerun_view.picture import write_picture
 from arm_ik_service.io.rerun_view.sinks import Connect, Save, Sink, Spawn, Web, has_display
 from arm_ik_service.io.rerun_view.view import OPENXR_GRIP, RerunView, write_recording
 
-__all__ = ["OPENXR_GRIP", "Connect", "RerunView", "Save", "Sink", "Spawn", "Web", "has_display", "write_picture", "write_recording"]
+__all__ = [
+    "OPENXR_GRIP",
+    "Connect",
+    "LiveView",
+    "RerunView",
+    "Save",
+    "Sink",
+    "Spawn",
+    "Web",
+    "has_display",
+    "write_picture",
+    "write_recording",
+]

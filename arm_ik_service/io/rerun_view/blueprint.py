@@ -11,9 +11,9 @@ from arm_ik_service.geometry import batch
 from arm_ik_service.io.rerun_view.rows import ANGLES
 from arm_ik_service.wire.messages import Pose, Vector
 
-WINDOW_S = 8.0  # what a plot shows, up to the time cursor
-WINDOW_FRAMES = 720  # the same on the timeline `frame`, at 90 Hz
-LEGEND_HEIGHT = 0.08
+WINDOW_S = 5.0  # what a plot shows, up to the time cursor
+WINDOW_FRAMES = 450  # the same on the timeline `frame`, at 90 Hz
+LEGEND_HEIGHT = 0.075
 
 Views = list["rrb.View | rrb.Container"]
 
@@ -27,11 +27,11 @@ def eye_in_front_of(chests: Sequence[Pose]) -> archetypes.EyeControls3D:
     forward[1] = 0.0
     forward = batch.normalized(forward if float(forward @ forward) > 1e-6 else (0.0, 0.0, -1.0))
     left = (forward[2], 0.0, -forward[0])
-    distance = 1.55 + 1.6 * spread
+    distance = 1.40 + 1.6 * spread
     position = [middle[k] + distance * forward[k] + 0.22 * distance * left[k] for k in range(3)]
     position[1] = middle[1] + 0.30 * distance
     return archetypes.EyeControls3D(
-        kind=rrb.Eye3DKind.Orbital, position=position, look_target=_raised(middle, -0.06), eye_up=(0.0, 1.0, 0.0)
+        kind=rrb.Eye3DKind.Orbital, position=position, look_target=_raised(middle, -0.04), eye_up=(0.0, 1.0, 0.0)
     )
 
 
@@ -47,12 +47,12 @@ def _window() -> list[rrb.VisibleTimeRange]:
     ]
 
 
-def _plot(entity: str, name: str, *, legend: bool = False) -> rrb.TimeSeriesView:
+def _plot(entity: str, name: str) -> rrb.TimeSeriesView:
     return rrb.TimeSeriesView(
         origin=entity,
         name=name,
         time_ranges=_window(),
-        plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop, visible=legend),
+        plot_legend=rrb.PlotLegend(visible=False),  # it would lie over the lines; `legend` says it once for all
     )
 
 
@@ -70,10 +70,10 @@ def _plots(root: str, name: str) -> rrb.Container:
         ),
         rrb.Horizontal(
             _plot(f"{root}/plots/residual_mm", "hand residual [mm]"),
-            _plot(f"{root}/plots/latency_ms", "latency [ms]", legend=True),
+            _plot(f"{root}/plots/latency_ms", "latency [ms]"),
         ),
         rrb.StateTimelineView(origin=f"{root}/plots/tracking", name="tracking", time_ranges=_window()),
-        row_shares=[3.2, 1.2, 0.8],
+        row_shares=[3.1, 1.2, 0.9],
         name=name,
     )
 
@@ -90,7 +90,7 @@ def blueprint_of(roots: dict[str, str], chests: Sequence[Pose]) -> rrb.Blueprint
             name="arms",
             eye_controls=eye_in_front_of(chests),
             background=archetypes.Background(color=(24, 27, 33)),
-            line_grid=archetypes.LineGrid3D(visible=True, spacing=0.5, stroke_width=1.0, color=(255, 255, 255, 28)),
+            line_grid=archetypes.LineGrid3D(visible=True, spacing=0.5, stroke_width=0.5, color=(150, 160, 180, 60)),
         ),
         rrb.TextDocumentView(origin="/legend", name="legend", titlebar=False),
         row_shares=[1.0 - LEGEND_HEIGHT, LEGEND_HEIGHT],

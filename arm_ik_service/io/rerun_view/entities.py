@@ -16,6 +16,8 @@ from arm_ik_service.io.rerun_view.rows import ANGLES, LATENCIES, PLACES, STATES,
 from arm_ik_service.io.rerun_view.solids import Solid
 from arm_ik_service.wire.messages import SIDES, VERSION, ArmsState, Pose, Side, Skeleton, TrackingState
 
+Integers = npt.NDArray[np.int64]
+
 NECK_ROOT = (0.0, 0.065, 0.004)  # top of the torso in the chest frame [m]
 GIRDLE_ROOT = (0.035, 0.014, 0.0)  # of the right side, in the chest frame [m]
 SKULL_BASE = (0.0, -0.075, 0.082)  # in the head frame [m]
@@ -176,21 +178,21 @@ class Sender:
         for name, pose in (("upper_arm", upper_arm), ("forearm", forearm), ("hand", hand)):
             self._move(f"{side}/{name}", pose)
 
-        there = np.isfinite(target).all(axis=1)
-        shown = np.where(there[:, None], target, hand)
+        there = np.isfinite(target).all(axis=1, keepdims=True)
+        shown = np.where(there, target, hand)
         self._columns(
             f"{side}/target",
             rr.Transform3D.columns(
                 translation=shown[:, :3],
                 quaternion=shown[:, 3:],
-                scale=np.repeat(np.where(there, 1.0, HIDDEN)[:, None], 3, axis=1),
+                scale=np.repeat(np.where(there, 1.0, HIDDEN), 3, axis=1),
             ),
         )
         held = batch.compose(hand, self._wrist_from_grip[side])[:, :3]
-        line = np.stack([held, np.where(there[:, None], target[:, :3], held)], axis=1)
+        line = np.stack([held, np.where(there, target[:, :3], held)], axis=1)
         self._columns(f"{side}/residual", rr.LineStrips3D.columns(strips=line))
 
-    def _send_state(self, side: Side, states: list[TrackingState], frames: Floats, times: Floats) -> None:
+    def _send_state(self, side: Side, states: list[TrackingState], frames: Integers, times: Integers) -> None:
         """Log the state where it changes: the band of the plot and the colour of the hand."""
         before = [self._states[side], *states[:-1]]
         changed = [k for k, (a, b) in enumerate(zip(before, states, strict=True)) if a != b]
@@ -220,7 +222,7 @@ class Sender:
         self._scalars("latency_ms", values[:, PLACES["latency_ms"]])
 
 
-def _time(frames: npt.NDArray[np.int64], times_ns: npt.NDArray[np.int64]) -> list[rr.TimeColumn]:
+def _time(frames: Integers, times_ns: Integers) -> list[rr.TimeColumn]:
     return [
         rr.TimeColumn("frame", sequence=frames),
         rr.TimeColumn("sample_time", duration=times_ns.astype("timedelta64[ns]")),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import socket
 import subprocess
 import tempfile
 import time
@@ -14,8 +13,9 @@ from pathlib import Path
 from rerun.experimental import ViewerClient
 
 from arm_ik_service.errors import ViewError
-from arm_ik_service.io.rerun_view.sinks import viewer_binary
+from arm_ik_service.io.rerun_view.sinks import free_port, viewer_binary
 
+RRD_MAGIC = b"RRF"
 START_WITHIN_S = 60.0  # software rendering on a busy machine takes its time
 SETTLED_AFTER_S = 1.0  # from the change of time to a picture in which every plot has followed
 
@@ -25,13 +25,19 @@ def write_picture(
 ) -> None:
     """Write what the viewer shows of `recording` (.rrd) at `frame` (the last one if None) as a .png.
 
-    The picture has twice the given size in pixels. Needs a Vulkan driver; Mesa's software one (lavapipe) will do.
+    Needs a Vulkan driver; Mesa's software one (lavapipe) will do.
     Raises ViewError.
     """
-    if not recording.is_file():
-        raise ViewError(f"no recording at {recording}")
+    try:
+        with recording.open("rb") as file:
+            magic = file.read(len(RRD_MAGIC))
+    except OSError as error:
+        raise ViewError(f"cannot read {recording}: {error.strerror}") from error
+    if magic != RRD_MAGIC:
+        raise ViewError(f"{recording} is no Rerun recording")
     with _headless_viewer(recording, width, height) as viewer:
         last = _last_frame(viewer)
+        _hide_bars(viewer)
         viewer.set_time("frame", sequence=last if frame is None else frame, play_state="paused")
         time.sleep(SETTLED_AFTER_S)
         viewer.save_screenshot(str(picture.resolve()))
@@ -41,9 +47,7 @@ def write_picture(
 
 @contextlib.contextmanager
 def _headless_viewer(recording: Path, width: int, height: int) -> Iterator[ViewerClient]:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+    port = free_port()
     options = ["--headless", "--bind", "127.0.0.1", "--port", str(port), "--window-size", f"{width}x{height}"]
     with tempfile.TemporaryDirectory() as folder, (Path(folder) / "log").open("w+") as log:
         # What the viewer logs it also shows, over the plots: hence only errors. The folder stands in for a session's.
@@ -65,9 +69,7 @@ def _wait_until_loaded(url: str, process: subprocess.Popen[bytes], log: Path) ->
     viewer: ViewerClient | None = None
     while time.monotonic() < give_up:
         if process.poll() is not None:
-            said = log.read_text().strip().splitlines()
-            why = said[-1] if said else f"exit code {process.returncode}"
-            raise ViewError(f"the headless viewer ended: {why} (it needs a Vulkan driver, such as mesa-vulkan-drivers)")
+            raise ViewError(f"the headless viewer ended: {_why(log.read_text(), process.returncode)}")
         with contextlib.suppress(RuntimeError, ConnectionError):
             viewer = viewer or ViewerClient.connect(url)
             state = viewer.get_state()
@@ -75,6 +77,21 @@ def _wait_until_loaded(url: str, process: subprocess.Popen[bytes], log: Path) ->
                 return viewer
         time.sleep(0.1)
     raise ViewError(f"the headless viewer was not ready within {START_WITHIN_S:.0f} s")
+
+
+def _why(said: str, code: int) -> str:
+    if "adapter" in said:
+        return "it found no Vulkan driver; mesa-vulkan-drivers holds one that needs no graphics card"
+    telling = [line for line in said.splitlines() if "error" in line.lower()]
+    return telling[0] if telling else f"exit code {code}"
+
+
+def _hide_bars(viewer: ViewerClient) -> None:
+    """Leave only views: the menu's warnings about this machine's graphics say nothing about the recording."""
+    blueprint = viewer.get_blueprint("recording").blueprint
+    blueprint["/top_panel"] = {"PanelBlueprint": {"state": "Hidden"}}
+    blueprint["/time_panel"]["TimePanelBlueprint"]["state"] = "Hidden"
+    viewer.set_blueprint(blueprint, "recording")
 
 
 def _last_frame(viewer: ViewerClient) -> int:

@@ -11,7 +11,7 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 import rerun as rr
-import rerun_cli
+import rerun_cli  # type: ignore[import-untyped]  # only its folder is asked for
 
 from arm_ik_service.errors import ViewError
 
@@ -29,9 +29,7 @@ class Save:
 
 @dataclass(frozen=True)
 class Spawn:
-    """Start the desktop viewer, or use the one that listens on this port already."""
-
-    port: int = VIEWER_PORT
+    """Start a desktop viewer of our own."""
 
 
 @dataclass(frozen=True)
@@ -80,22 +78,22 @@ def attach(recording: rr.RecordingStream, sinks: Sequence[Sink]) -> None:
     """Open all `sinks` and send everything to each. Raises ViewError with the cause and what to do about it."""
     if not sinks:
         raise ViewError("the view has nowhere to go: give it a file, a viewer or the web")
-    opened = [_open(sink) for sink in sinks]
+    opened = [_open(sink, recording) for sink in sinks]
     try:
         recording.set_sinks(*opened)
     except (ValueError, RuntimeError, OSError) as error:
-        raise ViewError(f"Rerun refuses these sinks: {_first_line(error)}") from error
+        raise ViewError(f"Rerun refuses these sinks: {first_line(error)}") from error
     for sink in sinks:
         if isinstance(sink, Web):
             _serve_web(sink)
 
 
-def _open(sink: Sink) -> rr.FileSink | rr.GrpcSink | rr.GrpcServerSink:
+def _open(sink: Sink, recording: rr.RecordingStream) -> rr.FileSink | rr.GrpcSink | rr.GrpcServerSink:
     match sink:
         case Save(path):
             return _open_file(path)
-        case Spawn(port):
-            return _spawn(port)
+        case Spawn():
+            return _spawn(recording)
         case Connect(url):
             return _connect(url)
         case Web():
@@ -108,15 +106,16 @@ def _open_file(path: Path) -> rr.FileSink:
             pass
         return rr.FileSink(str(path))
     except (OSError, RuntimeError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else _first_line(error)
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else first_line(error)
         raise ViewError(f"cannot write {path}: {reason}") from error
 
 
-def _spawn(port: int) -> rr.GrpcSink:
+def _spawn(recording: rr.RecordingStream) -> rr.GrpcSink:
     if not has_display():
         raise ViewError(
             "no display to open the Rerun viewer on: write a file with --save FILE.rrd, or serve with --web"
         )
+    port = VIEWER_PORT if _is_free(VIEWER_PORT) else free_port()
     try:
         rr.spawn(
             port=port,
@@ -124,36 +123,43 @@ def _spawn(port: int) -> rr.GrpcSink:
             memory_limit=VIEWER_MEMORY,
             hide_welcome_screen=True,
             executable_path=str(viewer_binary()),
+            recording=recording,
         )
-        return rr.GrpcSink(f"rerun+http://127.0.0.1:{port}/proxy")
     except (RuntimeError, OSError, ValueError) as error:
-        raise ViewError(f"the Rerun viewer did not start on port {port}: {_first_line(error)}") from error
+        raise ViewError(f"the Rerun viewer did not start: {first_line(error)}") from error
+    return _reach(
+        f"rerun+http://127.0.0.1:{port}/proxy",
+        "the Rerun viewer ended at once: it needs a display and a graphics driver; else use --save FILE.rrd or --web",
+    )
 
 
 def _connect(url: str) -> rr.GrpcSink:
+    return _reach(url, f"no Rerun viewer answers at {url}: start one with `rerun`, or write --save FILE.rrd")
+
+
+def _reach(url: str, otherwise: str) -> rr.GrpcSink:
+    """Return a sink to a viewer that answers: the sink itself would wait for one and keep what it cannot send."""
     try:
         sink = rr.GrpcSink(url)
         parts = urlsplit(url.removeprefix("rerun+"))
-        host, port = parts.hostname, parts.port or VIEWER_PORT
+        host, port = parts.hostname or "127.0.0.1", parts.port or VIEWER_PORT
     except (ValueError, RuntimeError) as error:
         raise ViewError(f"{url} is no address of a viewer: it looks like rerun+http://127.0.0.1:9876/proxy") from error
     try:
-        # The sink itself would wait for a viewer for ever, and keep what it cannot send.
-        socket.create_connection((host or "127.0.0.1", port), timeout=2.0).close()
+        socket.create_connection((host, port), timeout=2.0).close()
     except OSError as error:
-        raise ViewError(
-            f"no Rerun viewer answers at {url}: start one with `rerun`, or write --save FILE.rrd"
-        ) from error
+        raise ViewError(otherwise) from error
     return sink
 
 
 def _serve(sink: Web) -> rr.GrpcServerSink:
     for port in (sink.data_port, sink.port):
-        _require_free(port)
+        if not _is_free(port):
+            raise ViewError(f"port {port} is in use: is another viewer running? choose another port")
     try:
         return rr.GrpcServerSink("0.0.0.0", sink.data_port, server_memory_limit=VIEWER_MEMORY)
     except (RuntimeError, OSError, ValueError) as error:
-        raise ViewError(f"cannot serve the view's data on port {sink.data_port}: {_first_line(error)}") from error
+        raise ViewError(f"cannot serve the view's data on port {sink.data_port}: {first_line(error)}") from error
 
 
 def _serve_web(sink: Web) -> None:
@@ -164,17 +170,26 @@ def _serve_web(sink: Web) -> None:
             connect_to=f"rerun+http://localhost:{sink.data_port}/proxy",
         )
     except (RuntimeError, OSError, ValueError) as error:
-        raise ViewError(f"cannot serve the web viewer on port {sink.port}: {_first_line(error)}") from error
+        raise ViewError(f"cannot serve the web viewer on port {sink.port}: {first_line(error)}") from error
 
 
-def _require_free(port: int) -> None:
+def _is_free(port: int) -> bool:
     with socket.socket() as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             probe.bind(("0.0.0.0", port))
-        except OSError as error:
-            raise ViewError(f"port {port} is in use: is another viewer running? choose another port") from error
+        except OSError:
+            return False
+    return True
 
 
-def _first_line(error: BaseException) -> str:
+def free_port() -> int:
+    """Return a TCP port that nobody listens on."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def first_line(error: BaseException) -> str:
+    """Return the first line of what an error says."""
     return str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,21 +12,24 @@ from uuid import uuid4
 
 import rerun as rr
 
+from arm_ik_service.errors import ViewError
 from arm_ik_service.io.rerun_view.blueprint import blueprint_of
 from arm_ik_service.io.rerun_view.entities import Sender, entity_of, log_styles, skeleton_of
 from arm_ik_service.io.rerun_view.rows import Rows
-from arm_ik_service.io.rerun_view.sinks import Save, Sink, attach
+from arm_ik_service.io.rerun_view.sinks import Save, Sink, attach, first_line
 from arm_ik_service.wire.messages import ArmsState, ControllerFrame, Pose, Side, Skeleton
 
 APPLICATION = "arm_ik"
+CLOSE_WITHIN_S = 5.0
 BATCH_ROWS = 512  # offline: rows gathered before they are sent; a call then costs nothing a row
 OPENXR_GRIP: dict[Side, Pose] = {  # wrist_from_grip of DESIGN section 2
     "left": Pose((0.0, -0.02, -0.075), (0.5, -0.5, -0.5, 0.5)),
     "right": Pose((0.0, -0.02, -0.075), (0.5, 0.5, 0.5, 0.5)),
 }
 LEGEND = """\
-**sleeves and plots** blue: left, orange: right. **dark red lines**: joint limits. **white controller**: the pose asked for.
-**red line**: from the hand to it.  **hands** green: tracked, yellow: inferred, pink: held, grey: lost.
+**Sleeves, plots**: left blue, right orange. **Dark red**: joint limits. **White controller**: the pose asked for; \
+**red line**: from the hand to it. **Hands**: tracked green, inferred yellow, held pink, lost grey. \
+**Latency**: network blue, solve violet, total white.
 """
 
 
@@ -80,14 +84,31 @@ class RerunView:
             self._send(person)
 
     def flush(self) -> None:
-        """Send what was gathered. Does not wait for the viewer."""
+        """Send what was gathered. Does not wait for the viewer; what it has not taken yet waits in memory."""
         for person in self._people.values():
             self._send(person)
 
+    def settled(self, timeout_s: float) -> bool:
+        """Wait until the file or the viewer has taken everything that was sent, or the time is over.
+
+        Raises ViewError where it never will: the viewer was closed, the disk is full.
+        """
+        try:
+            self._recording.flush(timeout_sec=timeout_s)
+        except RuntimeError as error:
+            if "timed out" in str(error):
+                return False
+            raise ViewError(f"the view ends here, its viewer or file is gone: {first_line(error)}") from error
+        return True
+
     def close(self) -> None:
-        """Send the rest, finish the file and let go of the viewer."""
+        """Send the rest, finish the file and let go of the viewer. Raises ViewError where the rest was not taken."""
         self.flush()
-        self._recording.flush(timeout_sec=5.0)
+        if not self.settled(CLOSE_WITHIN_S):
+            _abandon(self._recording)
+            raise ViewError(
+                f"the viewer did not take the last of the view within {CLOSE_WITHIN_S:.0f} s: does it hang?"
+            )
         self._recording.disconnect()
 
     def __enter__(self) -> Self:
@@ -117,6 +138,13 @@ class RerunView:
         roots = {name: one.root for name, one in self._people.items()}
         self._recording.send_blueprint(blueprint_of(roots, [one.chest for one in self._people.values()]))
         return person
+
+
+def _abandon(recording: rr.RecordingStream) -> None:
+    """Leave a stream whose viewer hangs: to disconnect it, or to let it be collected at exit, would wait for ever."""
+    for one in (recording, recording.to_native()):
+        ctypes.pythonapi.Py_IncRef(ctypes.py_object(one))
+    rr.unregister_shutdown()
 
 
 def write_recording(
