@@ -37,7 +37,10 @@ _INDEX_ENTRY = 16
 _IN_DATA = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
 
 # what the library, zstandard and lz4 raise over bytes that are not theirs
-_DAMAGED = (McapError, CRCValidationError, zstandard.ZstdError, struct.error, ValueError, RuntimeError, EOFError)
+_DAMAGED = (
+    *(McapError, CRCValidationError, zstandard.ZstdError, struct.error),
+    *(ValueError, RuntimeError, EOFError, OverflowError, MemoryError),
+)
 
 
 class LoggedMessage(NamedTuple):
@@ -140,6 +143,7 @@ def _walk(log: Log, file: BinaryIO, size: int) -> None:
         else:
             if indexed is not None and not (indexed and indexed <= log.topics.keys()):
                 _look_into(log, file, log.segments[-1], count=not indexed)
+                file.seek(start)
             indexed = None
             if opcode == Opcode.CHUNK and length >= SHORTEST_CHUNK:
                 start_ns, end_ns = _CHUNK_TIMES.unpack(file.read(_CHUNK_TIMES.size))
