@@ -24,15 +24,16 @@ class TrackingSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     # what to do with poses that are valid but not tracked (dead-reckoned), and with none at all
     dead_reckoning: Literal["freeze", "follow", "fade_to_rest"] = "freeze"
     lost_after_s: Annotated[float, Meta(ge=0.0)] = 1.0  # without good data a device is held, after this long it is lost
-    reacquire_m_s: Annotated[float, Meta(gt=0.0)] = 12.0  # speed of the way back to good data, added to the data's own:
-    reacquire_rad_s: Annotated[float, Meta(gt=0.0)] = 40.0  # 0.9 m and half a turn take 0.12 s; at the least it is 0.04
-    smoothing: Literal["off", "light", "strong"] = "light"  # trails by 0, 1.1 or 8 mm: at 2 m/s by 0, 0.5 or 4 ms
+    reacquire_m_s: Annotated[float, Meta(gt=0.0)] = 14.0  # speed of the way back to good data, added to the data's own:
+    reacquire_rad_s: Annotated[float, Meta(gt=0.0)] = 45.0  # 0.9 m or half a turn take 0.1 s; at the least it is 0.04
+    smoothing: Literal["off", "light", "strong"] = "light"  # adds 0, 0.2 or 2.5 ms to a stroke of 2 m/s
 
 
 class BodySettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """One person in space."""
 
-    soft_reach_from: float = 0.98  # part of the straight arm at which the soft reach clamp sets in; 1 turns it off
+    # part of the straight arm at which the soft reach clamp sets in; it costs 3 mm at full reach, 1 makes it a hard one
+    soft_reach_from: Annotated[float, Meta(gt=0.5, le=1.0)] = 0.985
 
 
 class SolverSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

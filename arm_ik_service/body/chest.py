@@ -25,14 +25,8 @@ HANDS_LINE_PULL = 0.25  # perpendicular to the line between the hands, in arm le
 FACING_TIME_S = 0.05  # time in which the chest follows (fit)
 SURE_FACING = 0.5  # a shorter sum says little about the direction: the chest follows less
 FASTEST_TURN_RAD_S = 12.0  # of a chest; a skater's pirouette is 30, a dancer's 15
-LARGEST_TURN_RAD = 0.25  # in a frame, whatever its length
-
-
-@compiled
-def forward_of(head: Quaternion) -> Vector:
-    """Horizontal direction a head faces: of unit length at any pitch, so also where it looks straight down."""
-    z, y = g.rotate(head, g.Z), g.rotate(head, g.Y)
-    return (z[1] * y[0] - y[1] * z[0], 0.0, z[1] * y[2] - y[1] * z[2])
+LARGEST_TURN_RAD = 0.33  # in a frame, whatever its length ...
+RECENTRED_RAD = 0.5  # ... unless the space turned by more than this: less may be the pop of a whole recording
 
 
 @compiled
@@ -47,7 +41,7 @@ def facing(body: Record, neck: Vector, head: Quaternion) -> Vector:
     """Horizontal direction the chest would face if it had the time; shorter where that is less sure."""
     left, right = g.vector(body.wrists[0].position), g.vector(body.wrists[1].position)
     line = g.subtract(right, left)
-    total = g.add(forward_of(head), _pull(HANDS_LINE_PULL, line[2], -line[0], body.arm_length))
+    total = g.add(g.heading(head), _pull(HANDS_LINE_PULL, line[2], -line[0], body.arm_length))
     for hand in (left, right):
         away = g.subtract(hand, neck)
         total = g.add(total, _pull(HAND_PULL, away[0], away[2], body.arm_length))
@@ -55,24 +49,27 @@ def facing(body: Record, neck: Vector, head: Quaternion) -> Vector:
 
 
 @compiled
-def _turn(body: Record, direction: Vector, elapsed_s: float) -> None:
+def _turn(body: Record, direction: Vector, recentred: float, elapsed_s: float) -> None:
     yaw = math.atan2(-direction[0], -direction[2])
     if body.started == 0:
         body.yaw = yaw
         return
     sure = min(g.norm(direction) / SURE_FACING, 1.0)
-    turn = sure * g.wrap(yaw - body.yaw) * (1.0 - math.exp(-elapsed_s / FACING_TIME_S))
-    most = min(FASTEST_TURN_RAD_S * elapsed_s, LARGEST_TURN_RAD)
-    body.yaw = g.wrap(body.yaw + g.clip(turn, -most, most))
+    most = FASTEST_TURN_RAD_S * elapsed_s
+    turn = sure * g.wrap(yaw - body.yaw - recentred) * (1.0 - math.exp(-elapsed_s / FACING_TIME_S))
+    turn = recentred + g.clip(turn, -most, most)
+    if abs(recentred) < RECENTRED_RAD:
+        turn = g.clip(turn, -LARGEST_TURN_RAD, LARGEST_TURN_RAD)
+    body.yaw = g.wrap(body.yaw + turn)
 
 
 @compiled
-def step_chest(body: Record, elapsed_s: float) -> None:
-    """Update `chest_position` and `chest_rotation` from the head and the wrists."""
+def step_chest(body: Record, recentred: float, elapsed_s: float) -> None:
+    """Update the pose of the chest from head and wrists, in a space that turned by `recentred` [rad]."""
     head = g.quaternion(body.head_rotation)
     pivot = g.scale(body.arm_length / ARM_LENGTH_OF_FIT, NECK_PIVOT_IN_HEAD)
     neck = g.add(g.vector(body.head_position), g.rotate(head, pivot))
-    _turn(body, facing(body, neck, head), elapsed_s)
+    _turn(body, facing(body, neck, head), recentred, elapsed_s)
     upright = g.rotation_y(body.yaw)
     head_up = g.rotate(g.conjugate(upright), g.rotate(head, g.Y))
     up = (ROLL_SHARE * head_up[0], 1.0, PITCH_SHARE * head_up[2])

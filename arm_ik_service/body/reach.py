@@ -6,14 +6,17 @@ import math
 
 from arm_ik_service.compiled import compiled
 
+FULLY_STRETCHED = 0.9995  # of the straight arm: 4 degrees of elbow flexion stay, so its swivel stays defined
+
 
 @compiled
 def soft_reach(ratio: float, soft_from: float) -> float:
-    """Reach ratio that is granted for the one asked for: itself up to `soft_from`, then ever less, and never 1.
+    """Reach ratio that is granted for the one asked for: itself up to `soft_from`, from there ever less of it.
 
-    Continuous with its first derivative, so an arm that runs out of length slows down and never freezes.
+    Continuous with its first derivative and never above FULLY_STRETCHED: an arm that runs out of length slows down,
+    it does not freeze and lurch.
     """
-    room = 1.0 - soft_from
+    room = FULLY_STRETCHED - soft_from
     if ratio <= soft_from or room <= 0.0:
-        return min(ratio, 1.0)
-    return 1.0 - room * math.exp(-(ratio - soft_from) / room)
+        return min(ratio, FULLY_STRETCHED)
+    return FULLY_STRETCHED - room * math.exp(-(ratio - soft_from) / room)

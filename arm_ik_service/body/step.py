@@ -13,8 +13,6 @@ from arm_ik_service.body.state import BODY
 from arm_ik_service.compiled import Record, compiled
 from arm_ik_service.geometry import batch
 from arm_ik_service.geometry import scalar as g
-from arm_ik_service.tracking.clock import interval_s
-from arm_ik_service.tracking.state import INFERRED
 
 LONGEST_STEP_S = 0.1  # a gap in the data is not time in which the body was seen to move
 
@@ -75,14 +73,13 @@ def step_body(body: Record, tracking: Record, settings: Record) -> None:
     """Place the person in the BODY record for the devices of the TRACKING record. Always finite."""
     g.store(body.head_position, g.vector(tracking.head.position))
     g.store(body.head_rotation, g.quaternion(tracking.head.rotation))
-    interval = interval_s(tracking)
-    dt_s = interval if tracking.dt_s > 0.0 else 0.0
-    elapsed_s = min(interval, LONGEST_STEP_S)
+    dt_s = tracking.interval_s if tracking.dt_s > 0.0 else 0.0
+    elapsed_s = min(tracking.interval_s, LONGEST_STEP_S)
     for k in range(2):
         _place_wrist(body, tracking, k)
-    step_chest(body, elapsed_s)
+    step_chest(body, tracking.recentred_yaw, elapsed_s)
     for k in range(2):
-        if tracking.hands[k].position_state >= INFERRED and tracking.head.position_state >= INFERRED:
+        if tracking.hands[k].position_age_s == 0.0 and tracking.head.position_age_s == 0.0:  # both are seen
             settle(body, k, elapsed_s)
         step_shoulder(body, k)
         _set_target(body, k, dt_s, settings)

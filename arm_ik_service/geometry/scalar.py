@@ -176,6 +176,13 @@ def twist_y(q: Quaternion) -> float:
 
 
 @compiled
+def heading(q: Quaternion) -> Vector:
+    """Horizontal direction that -z, the front of an OpenXR pose, faces; of unit length at any pitch, short with roll."""
+    z, y = rotate(q, Z), rotate(q, Y)
+    return (z[1] * y[0] - y[1] * z[0], 0.0, z[1] * y[2] - y[1] * z[2])
+
+
+@compiled
 def swing_y(q: Quaternion) -> Quaternion:
     """The swing of q = swing * twist about y: the shortest rotation that takes y where q takes it."""
     return multiply(q, rotation_y(-twist_y(q)))

@@ -19,7 +19,7 @@ SHORTEST_INTERVAL = 0.25  # of the period: what is nearer together shares a jitt
 
 @compiled
 def step_clock(tracking: Record, seq: int, sample_time_ns: int, now_ns: int) -> int:
-    """Judge one frame by its times: a verdict. If ACCEPTED, sets `tracking.sample_time_ns` and `tracking.dt_s`."""
+    """Judge one frame by its times: a verdict. If ACCEPTED, sets the times of `tracking`."""
     clock = tracking.clock
     dt_ns = sample_time_ns - tracking.sample_time_ns
     if clock.started == 0:
@@ -38,11 +38,7 @@ def step_clock(tracking: Record, seq: int, sample_time_ns: int, now_ns: int) -> 
     tracking.dt_s = 1e-9 * dt_ns
     if 0.0 < tracking.dt_s < LONGEST_PERIOD_S:
         clock.period_s += PERIOD_GAIN * (tracking.dt_s - clock.period_s)
+    tracking.interval_s = clock.period_s
+    if dt_ns > 0:
+        tracking.interval_s = max(tracking.dt_s, SHORTEST_INTERVAL * clock.period_s)
     return ACCEPTED
-
-
-@compiled
-def interval_s(tracking: Record) -> float:
-    """Time [s] to divide a movement by: since the last frame, but never so little that noise looks like speed."""
-    dt_s, period_s = float(tracking.dt_s), float(tracking.clock.period_s)
-    return max(dt_s, SHORTEST_INTERVAL * period_s) if dt_s > 0.0 else period_s

@@ -14,9 +14,30 @@ ACCEPTED = 0
 OUT_OF_ORDER = 1  # an older sample than the last accepted one: refused, nothing changed
 DUPLICATE = 2  # the last accepted frame once more: refused, nothing changed
 REFUSALS = {OUT_OF_ORDER: "out_of_order", DUPLICATE: "duplicate"}  # names for health
-REFUSALS = {OUT_OF_ORDER: "out of order", DUPLICATE: "duplicate"}
 
 NEVER_S = 1e9  # age of data that never came
+
+
+def _channel(components: int) -> np.dtype[np.void]:
+    """Memory of one quantity of a device: a position (3) or a rotation (4); its tangents have three components."""
+    value, tangent = (np.float64, (components,)), (np.float64, (3,))
+    return record_dtype(
+        [
+            ("source", np.int64),  # what was followed last: TRACKED, INFERRED, or LOST for nothing yet or a pause
+            ("measured", *value),  # the last sample that was followed, as it came
+            ("rate", *tangent),  # from the one before to it, per second
+            ("suspect", *value),  # the last sample that was not followed because no hand moves like that
+            ("suspected_for_s", np.float64),  # how long such samples have agreed with each other
+            ("suspects", np.int64),  # how many they are
+            ("smooth", *value),  # the 1 Euro filter's
+            ("slope", *tangent),  # its estimate of the rate
+            ("restarted_s", np.float64),  # since the filter started afresh
+            ("offset", *tangent),  # what the output was away from the data when it was last re-acquired
+            ("fading_s", np.float64),  # since then
+            ("fades_for_s", np.float64),  # until the offset is nought
+        ]
+    )
+
 
 DEVICE = record_dtype(
     [
@@ -27,8 +48,11 @@ DEVICE = record_dtype(
         ("angular_velocity", np.float64, (3,)),
         ("position_state", np.int64),
         ("rotation_state", np.int64),
-        ("position_age_s", np.float64),  # since the last position that was good
+        ("position_age_s", np.float64),  # since the last position that was followed
         ("rotation_age_s", np.float64),
+        ("glitches", np.int64),  # samples not followed because no hand moves like that
+        ("position_channel", _channel(3)),
+        ("rotation_channel", _channel(4)),
     ]
 )
 CLOCK = record_dtype(
@@ -46,7 +70,10 @@ TRACKING = record_dtype(
         ("hands", DEVICE, (2,)),  # left, right
         ("sample_time_ns", np.int64),
         ("dt_s", np.float64),  # since the frame before; 0 for the first, for a repeated time, after a clock step
+        ("interval_s", np.float64),  # to divide movements by: dt_s, but never so little that noise looks like speed
         ("clock", CLOCK),
+        ("recentres", np.int64),  # how often the tracked space was found to have been moved
+        ("recentred_yaw", np.float64),  # by how much in this frame, about +Y
     ]
 )
 
@@ -54,4 +81,3 @@ TRACKING = record_dtype(
 # standing person of 1.75 m.
 HEAD_AT_REST = (0.0, 1.63, 0.0)
 HANDS_AT_REST = ((-0.25, -0.87, 0.05), (0.25, -0.87, 0.05))
-GRIPS_AT_REST = ((0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0, 1.0))

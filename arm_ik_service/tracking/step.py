@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 
 from arm_ik_service.compiled import Record, compiled
-from arm_ik_service.geometry.scalar import IDENTITY
-from arm_ik_service.tracking.clock import interval_s, step_clock
+from arm_ik_service.geometry import scalar as g
+from arm_ik_service.tracking.clock import step_clock
 from arm_ik_service.tracking.device import step_device
+from arm_ik_service.tracking.recentre import follow_recentre
+from arm_ik_service.tracking.rest import place_lost_hand
 from arm_ik_service.tracking.state import (
     ACCEPTED,
-    GRIPS_AT_REST,
     HANDS_AT_REST,
     HEAD_AT_REST,
     LOST,
@@ -24,20 +25,21 @@ from arm_ik_service.tracking.state import (
 __all__ = ["ACCEPTED", "REFUSALS", "initialise_tracking", "step_tracking"]
 
 
-def _reset_device(device: Record, position: Any, rotation: Any) -> None:
-    device.position[:], device.rotation[:] = position, rotation
+def _reset_device(device: Record, position: Any) -> None:
+    device.position[:], device.rotation[:] = position, g.IDENTITY
     device.position_state = device.rotation_state = LOST
     device.position_age_s = device.rotation_age_s = NEVER_S
+    for rotation in ("measured", "suspect", "smooth"):
+        device.rotation_channel[rotation][:] = g.IDENTITY
 
 
 def initialise_tracking(tracking: Record) -> None:
     """Set a TRACKING record to someone who stands at the origin, looks along -Z and was never seen: all `LOST`."""
     for name in TRACKING.names or ():
         tracking[name] = np.zeros((), TRACKING[name])
-    _reset_device(tracking.head, HEAD_AT_REST, IDENTITY)
+    _reset_device(tracking.head, HEAD_AT_REST)
     for k in range(2):
-        position = np.add(HEAD_AT_REST, HANDS_AT_REST[k])
-        _reset_device(tracking.hands[k], position, GRIPS_AT_REST[k])
+        _reset_device(tracking.hands[k], np.add(HEAD_AT_REST, HANDS_AT_REST[k]))
 
 
 @compiled
@@ -50,8 +52,12 @@ def step_tracking(tracking: Record, frame: Record, now_ns: int, settings: Record
     verdict = step_clock(tracking, frame.seq, frame.sample_time_ns, now_ns)
     if verdict != ACCEPTED:
         return verdict
-    elapsed_s = interval_s(tracking)
-    step_device(tracking.head, frame.head, elapsed_s, settings)
+    elapsed_s, period_s = tracking.interval_s, tracking.clock.period_s
+    follow_recentre(tracking, frame, elapsed_s)
+    head = g.vector(tracking.head.position)
+    step_device(tracking.head, frame.head, elapsed_s, period_s, settings)
+    head_moved = g.subtract(g.vector(tracking.head.position), head)
     for k in range(2):
-        step_device(tracking.hands[k], frame.hands[k], elapsed_s, settings)
+        step_device(tracking.hands[k], frame.hands[k], elapsed_s, period_s, settings)
+        place_lost_hand(tracking, k, head_moved, elapsed_s, settings.dead_reckoning)
     return ACCEPTED

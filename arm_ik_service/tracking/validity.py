@@ -31,9 +31,19 @@ def _rotation_is_plausible(rotation: Any) -> bool:
 
 
 @compiled
+def _was_filled_in(sample: Record) -> bool:
+    """Senders that have nothing yet send a pose of zeros; one that is real has a rotation."""
+    position = sample.position
+    at_origin = position[0] == 0.0 and position[1] == 0.0 and position[2] == 0.0
+    return not at_origin or _rotation_is_plausible(sample.rotation)
+
+
+@compiled
 def position_quality(sample: Record) -> int:
     """TRACKED, INFERRED (valid only: dead-reckoned, or a guess of the runtime) or LOST, for the position."""
     if sample.location_flags & POSITION_VALID == 0 or not _position_is_plausible(sample.position):
+        return LOST
+    if not _was_filled_in(sample):
         return LOST
     return TRACKED if sample.location_flags & POSITION_TRACKED else INFERRED
 
