@@ -12,6 +12,7 @@ from pathlib import Path
 
 import msgspec
 import numpy as np
+import people
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -28,13 +29,7 @@ from arm_ik_service.wire.messages import (
     ORIENTATION_VALID,
     VERSION,
     ArmsState,
-    ArmState,
-    Bones,
     ControllerFrame,
-    IsbShoulder,
-    JointAngles,
-    Pose,
-    Skeleton,
     TrackedPose,
 )
 
@@ -48,27 +43,11 @@ def frame(seq: int, *, time_ns: int | None = None) -> ControllerFrame:
 
 
 def answer(avatar: str, seq: int) -> ArmsState:
-    pose = Pose((0.1, 0.2, 0.1 + seq * 1e-9), (0.0, 0.0, 0.0, 1.0))
-    angles = JointAngles(*(0.1 * i for i in range(9)))
-    arm = ArmState(
-        "held",
-        "tracked",
-        "held",
-        (0.0,) * 10,
-        (1 / 3,) * 9,
-        angles,
-        angles,
-        IsbShoulder(0.1, 0.2, 0.3, singular=False),
-        Bones(pose, pose, pose, pose),
-        1e-4,
-        2e-3,
-        0.7,
-        5,
-        ("pronation",),
-        0.5,
-    )
     time = frame(seq).sample_time_ns
-    return ArmsState(VERSION, avatar, seq, time, time + 1000 + seq, 9000, time + 20_000, pose, pose, arm, arm)
+    _, state = people.answer(seq, avatar=avatar)
+    return msgspec.structs.replace(
+        state, sample_time_ns=time, receive_time_ns=time + 1000 + seq, publish_time_ns=time + 20_000
+    )
 
 
 def recording(path: Path, count: int = 400, avatars: tuple[str, ...] = ("anna",)) -> Path:
@@ -98,9 +77,8 @@ def test_frames_come_back_as_they_were_with_the_times_they_were_received(tmp_pat
 
 
 def test_answers_skeletons_and_profiles_lie_beside_the_frames(tmp_path: Path) -> None:
-    skeleton = Skeleton(VERSION, "anna", 1.7, 0.36, 0.3, 0.26, 0.18, (), ("pronation",))
     with RecordingWriter(tmp_path / "a.mcap", keys=Keys("lab3")) as writer:
-        writer.write_skeleton("anna", msgspec.msgpack.encode(skeleton), 0)
+        writer.write_skeleton("anna", msgspec.msgpack.encode(people.SKELETON), 0)
         writer.write_calibration("anna", b'{"body":{"stature_m":1.6}}', 1)
         writer.write_calibration("anna", msgspec.msgpack.encode({"body": {"stature_m": 1.7}}), 2)
         for seq in range(20):
@@ -109,7 +87,7 @@ def test_answers_skeletons_and_profiles_lie_beside_the_frames(tmp_path: Path) ->
     session = opened(tmp_path / "a.mcap")
     assert list(session.arms()) == [answer("anna", seq) for seq in range(20)]
     assert session.answer_count == 20
-    assert session.skeleton("anna") == skeleton
+    assert session.skeleton("anna") == people.SKELETON
     assert json.loads(session.calibration("anna") or b"") == {"body": {"stature_m": 1.7}}
     assert session.calibration("bert") is None
     assert session.skeleton("bert") is None
@@ -276,7 +254,7 @@ def test_a_full_disk_is_a_session_error(tmp_path: Path) -> None:
 KILLED = """
 import sys
 from pathlib import Path
-sys.path.insert(0, sys.argv[2])
+sys.path[:0] = sys.argv[2:]
 from test_recording import SECOND, frame
 from arm_ik_service.io.recording import RecordingWriter
 writer = RecordingWriter(Path(sys.argv[1]))
@@ -291,7 +269,7 @@ while True:
 
 def test_a_recorder_killed_while_it_writes_has_lost_a_second_at_most(tmp_path: Path) -> None:
     path = tmp_path / "killed.mcap"
-    command = [sys.executable, "-c", KILLED, str(path), str(Path(__file__).parent)]
+    command = [sys.executable, "-c", KILLED, str(path), str(Path(__file__).parent), str(Path(__file__).parents[1])]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         written = 0
