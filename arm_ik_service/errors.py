@@ -8,8 +8,10 @@
     │   ├── DecodeError      malformed, wrong shape or type; names the path of the field
     │   └── VersionError     a version of the message that this program does not speak
     ├── SessionError         a recording that cannot be read or written
+    ├── SkinError            an avatar file whose mesh or bones cannot be used
     ├── BusError             Zenoh could not be opened or reached
-    └── ViewError            Rerun could not be started or reached
+    ├── ViewError            Rerun could not be started or reached
+    └── BridgeError          a bridge cannot run: no OpenXR runtime, no headless session, no port, no certificate
 
 Every message names the cause and, where one is known, the cure; the data is on the error as attributes.
 """
@@ -58,9 +60,17 @@ class SessionError(ArmIkError):
         super().__init__(message if offset is None else f"{message} (at byte {offset})")
 
 
+class SkinError(ArmIkError):
+    """An avatar file whose mesh or bones cannot be used."""
+
+
 class BusError(ArmIkError):
     """Zenoh could not be opened or reached."""
 
 
 class ViewError(ArmIkError):
     """Rerun could not be started or reached."""
+
+
+class BridgeError(ArmIkError):
+    """A bridge cannot run: a runtime, an extension, a port or a certificate is missing."""

@@ -26,6 +26,8 @@ ROOMS: dict[str, set[str]] = {
     "skeleton": {*FOUNDATION, "wire", "arm", "body"},
     "avatar": {*FOUNDATION, "geometry", "settings", "wire", "tracking", "body", "arm", "ik", "output"},
     "io": {*FOUNDATION, "geometry", "settings", "wire"},
+    "exports": {*FOUNDATION, "geometry", "wire", "body"},
+    "bridges": {*FOUNDATION, "geometry", "wire", "body", "io"},
 }
 EVERYTHING = {"programs", "cli", "__init__", "__main__"}  # these put the rest together
 
@@ -33,11 +35,19 @@ EVERYTHING = {"programs", "cli", "__init__", "__main__"}  # these put the rest t
 OWNERS: dict[str, str | tuple[str, ...]] = {
     "zenoh": "io.zenoh_",
     "rerun": "io.rerun_view",
-    "mcap": "io.recording",
+    "mcap": ("io.recording", "exports.mcap_files"),
     "pinocchio": ("arm.", "ik."),
+    "pythonosc": "exports.osc",
+    "rosbags": "exports.ros2",
+    "foxglove": ("exports.foxglove_messages", "exports.mcap_files"),
+    "pyarrow": ("exports.table", "io.rerun_view"),
     "typer": "cli",
     "rich": "cli",
     "numba": ("compiled", "ik.clock"),  # the clock of a solver's time limit is an LLVM intrinsic
+    "xr": "bridges.openxr.pyopenxr",
+    "aiohttp": "bridges.web.server",
+    "cryptography": "bridges.web.certificate",
+    "segno": "bridges.web.invitation",
 }
 
 

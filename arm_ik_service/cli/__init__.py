@@ -10,8 +10,10 @@ import sys
 
 import typer
 
+from arm_ik_service.cli.bridge import bridge
 from arm_ik_service.cli.convert import convert
 from arm_ik_service.cli.demo import demo
+from arm_ik_service.cli.export import export
 from arm_ik_service.cli.record import record
 from arm_ik_service.cli.replay import replay
 from arm_ik_service.cli.schema import schema
@@ -28,8 +30,9 @@ app = typer.Typer(
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (demo, serve, replay, record, view, solve, convert, schema):
+for command in (demo, serve, replay, record, view, solve, convert, export, schema):
     app.command()(command)
+app.add_typer(bridge, name="bridge")
 
 
 def _version(asked: bool) -> None:
