@@ -8,6 +8,7 @@ import subprocess
 import time
 from collections import defaultdict
 from pathlib import Path
+from threading import Event
 from typing import Any
 
 import msgspec
@@ -205,6 +206,14 @@ def test_a_live_view_pairs_answers_with_frames_that_come_before_or_after(tmp_pat
     assert (live.shown, live.unpaired, live.dropped) == (4, 1, 0)
 
 
+def test_a_live_view_pairs_however_much_has_come_at_once(tmp_path: Path) -> None:
+    with LiveView(RerunView(Save(tmp_path / "live.rrd")), period_s=3600.0) as live:
+        for frame, arms in map(answer, range(300)):
+            live.offer_frame("ann", frame)
+            live.offer_arms(arms)
+    assert (live.shown, live.unpaired, live.dropped) == (300, 0, 0)
+
+
 def test_a_live_view_that_cannot_keep_up_drops_the_oldest_and_keeps_the_order(tmp_path: Path) -> None:
     path = tmp_path / "live.rrd"
     with LiveView(RerunView(Save(path)), period_s=3600.0, capacity=4) as live:
@@ -222,16 +231,17 @@ def test_a_killed_viewer_is_an_error_to_be_read_and_never_one_that_is_raised_whi
             [str(viewer_binary()), "--serve-grpc", "--bind", "127.0.0.1", "--port", str(port)], stdout=log, stderr=log
         )
         give_up = time.monotonic() + 60.0
-        live = None
+        live, gone = None, Event()
         while live is None:
             try:
-                live = LiveView(RerunView(Connect(f"rerun+http://127.0.0.1:{port}/proxy")))
+                view = RerunView(Connect(f"rerun+http://127.0.0.1:{port}/proxy"))
+                live = LiveView(view, when_gone=gone.set)
             except ViewError:
                 assert time.monotonic() < give_up
                 time.sleep(0.05)
         seq = 0
         with live:
-            while live.error is None:
+            while not gone.is_set():
                 assert time.monotonic() < give_up
                 live.offer_arms(answer(seq)[1])
                 seq += 1

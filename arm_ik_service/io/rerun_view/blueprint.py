@@ -29,9 +29,9 @@ def eye_in_front_of(chests: Sequence[Pose]) -> archetypes.EyeControls3D:
     left = (forward[2], 0.0, -forward[0])
     distance = 1.40 + 1.6 * spread
     position = [middle[k] + distance * forward[k] + 0.22 * distance * left[k] for k in range(3)]
-    position[1] = middle[1] + 0.30 * distance
+    position[1] = middle[1] + 0.28 * distance
     return archetypes.EyeControls3D(
-        kind=rrb.Eye3DKind.Orbital, position=position, look_target=_raised(middle, -0.04), eye_up=(0.0, 1.0, 0.0)
+        kind=rrb.Eye3DKind.Orbital, position=position, look_target=_raised(middle, -0.14), eye_up=(0.0, 1.0, 0.0)
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from contextlib import nullcontext, suppress
 from threading import Event, Lock, Thread
 from types import TracebackType
@@ -13,8 +14,9 @@ from arm_ik_service.io.rerun_view.view import RerunView
 from arm_ik_service.wire.messages import ArmsState, ControllerFrame, Skeleton
 
 PERIOD_S = 1 / 30  # what arrived in this time is sent together: a third of the calls at 90 Hz, and no eye sees it late
+FILE_PERIOD_S = 1.0  # nobody looks at a file while it is written, and few long pieces make a file of a tenth the size
 CAPACITY = 360  # answers that wait at most, 4 s of one avatar at 90 Hz; beyond it the oldest are dropped
-REMEMBERED = 64  # frames of an avatar that wait for their answers
+REMEMBERED = 64  # frames of an avatar that wait on for their answers; one that was overtaken never gets one
 
 
 class LiveView:
@@ -22,16 +24,24 @@ class LiveView:
 
     Nothing is sent before the viewer has taken what was sent before. Where it does not keep up, the oldest answers are
     dropped and counted, so what is seen is the newest. `offer_*` may be called from any thread, such as Zenoh's.
-    Where the viewer was closed, `error` says so, and what is offered is forgotten.
+    Where the viewer was closed, `error` says so, `when_gone` is called, and what is offered from then on is forgotten.
     """
 
-    def __init__(self, view: RerunView, *, period_s: float = PERIOD_S, capacity: int = CAPACITY) -> None:
+    def __init__(
+        self,
+        view: RerunView,
+        *,
+        period_s: float | None = None,
+        capacity: int = CAPACITY,
+        when_gone: Callable[[], None] = lambda: None,
+    ) -> None:
         self.shown = 0
         self.dropped = 0
         self.unpaired = 0  # answers whose frame was not seen: drawn without a target
         self.error: ViewError | None = None
         self._view = view
-        self._period_s = period_s
+        self._when_gone = when_gone
+        self._period_s = period_s or (PERIOD_S if view.watched else FILE_PERIOD_S)
         self._lock = Lock()
         self._answers: deque[ArmsState] = deque(maxlen=capacity)
         self._skeletons: list[Skeleton] = []
@@ -81,6 +91,7 @@ class LiveView:
             self._draw()
         except ViewError as error:
             self.error = error
+            self._when_gone()
 
     def _draw(self) -> None:
         with self._lock:
@@ -92,13 +103,13 @@ class LiveView:
         for skeleton in skeletons:
             self._view.describe(skeleton)
         for avatar, frame in arrived:
-            waiting = self._frames.setdefault(avatar, {})
-            waiting[frame.seq] = frame
-            if len(waiting) > REMEMBERED:
-                del waiting[next(iter(waiting))]
+            self._frames.setdefault(avatar, {})[frame.seq] = frame
         for arms in answers:
             paired = self._frames.get(arms.avatar, {}).pop(arms.seq, None)
             self.unpaired += paired is None
             self._view.add(arms, paired)
         self.shown += len(answers)
+        for waiting in self._frames.values():
+            for seq in list(waiting)[: max(len(waiting) - REMEMBERED, 0)]:
+                del waiting[seq]
         self._view.flush()

@@ -58,6 +58,7 @@ class RerunView:
         """
         self._recording = rr.RecordingStream(APPLICATION, recording_id=uuid4(), send_properties=True)
         attach(self._recording, sinks)
+        self.watched = not all(isinstance(sink, Save) for sink in sinks)  # somebody looks on
         self._spacing_m = spacing_m
         self._people: dict[str, _Person] = {}
         self._described: dict[str, tuple[Skeleton, Mapping[Side, Pose]]] = {}
