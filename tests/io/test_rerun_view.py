@@ -117,6 +117,16 @@ def test_residual_and_latency_are_in_the_units_of_their_names(
     np.testing.assert_allclose(log.of("/avatar/ann/plots/latency_ms", "Scalars:scalars"), [[2.0, 0.25, 3.0]] * 20)
 
 
+def test_a_session_solved_offline_has_no_latency_and_an_answer_without_its_frame_only_that_of_the_solve(
+    tmp_path: Path,
+) -> None:
+    frame, arms = answer(0)
+    path = tmp_path / "view.rrd"
+    write_recording(path, [(frame, msgspec.structs.replace(arms, publish_time_ns=0)), (None, answer(1)[1])])
+    latency = Recorded(path).of("/avatar/ann/plots/latency_ms", "Scalars:scalars")
+    np.testing.assert_array_equal(latency, [[math.nan] * 3, [math.nan, 0.25, math.nan]])
+
+
 def test_the_residual_line_runs_from_the_grip_in_the_hand_to_the_pose_asked_for(
     arms_and_recording: tuple[list[Answer], Recorded],
 ) -> None:
@@ -175,6 +185,7 @@ def test_people_have_a_tree_each_and_meshes_are_logged_once(tmp_path: Path) -> N
         for root in ("/avatar/ann/", r"/avatar/bob.2/")
     )
     assert one == other
+    assert "head/name" in one, "two people are told apart by their names"
     assert {"chest", "head", "neck", "left/forearm", "right/target", "plots/angles/pronation"} <= one
     assert len([key for key in log.temporal if key[1] == "Mesh3D:vertex_positions"]) == 0
     meshes = {entity for entity, component in log.static if component == "Mesh3D:vertex_positions"}

@@ -11,7 +11,7 @@ import rerun as rr
 
 from arm_ik_service.geometry import batch
 from arm_ik_service.io.rerun_view import figure
-from arm_ik_service.io.rerun_view.palette import LATENCY_COLOURS, LIMIT, RESIDUAL, SIDE_COLOURS, STATE_COLOURS
+from arm_ik_service.io.rerun_view.palette import LATENCY_COLOURS, LIMIT, NAME, RESIDUAL, SIDE_COLOURS, STATE_COLOURS
 from arm_ik_service.io.rerun_view.rows import ANGLES, LATENCIES, PLACES, STATES, Floats, Rows
 from arm_ik_service.io.rerun_view.solids import Solid
 from arm_ik_service.wire.messages import SIDES, VERSION, ArmsState, Pose, Side, Skeleton, TrackingState
@@ -21,6 +21,7 @@ Integers = npt.NDArray[np.int64]
 NECK_ROOT = (0.0, 0.065, 0.004)  # top of the torso in the chest frame [m]
 GIRDLE_ROOT = (0.035, 0.014, 0.0)  # of the right side, in the chest frame [m]
 SKULL_BASE = (0.0, -0.075, 0.082)  # in the head frame [m]
+ABOVE_HEAD = (0.0, 0.24, 0.085)  # in the head frame [m]
 LINE_RADIUS_M = 0.0035
 FOREARM_PER_STATURE, HAND_PER_FOREARM = 0.146, 0.108 / 0.146  # Drillis & Contini 1966
 HIDDEN = 1e-6  # scale of what is not there
@@ -102,6 +103,12 @@ def log_styles(recording: rr.RecordingStream, root: str) -> None:
             rr.StateConfiguration(values=STATES, colors=[STATE_COLOURS[state] for state in STATES]),
             static=True,
         )
+
+
+def log_name(recording: rr.RecordingStream, root: str, name: str) -> None:
+    """Log a name above the head, static."""
+    label = rr.Points3D([ABOVE_HEAD], radii=[0.001], colors=[NAME], labels=[name], show_labels=True)
+    recording.log(f"{root}/head/name", label, static=True)
 
 
 def between_y(direction: Floats) -> Floats:

@@ -13,5 +13,6 @@ STATE_COLOURS: dict[TrackingState, Colour] = {
     "lost": (120, 126, 138),
 }
 LIMIT: Colour = (150, 70, 76)
+NAME: Colour = (235, 238, 242)
 RESIDUAL: Colour = (255, 60, 90)
 LATENCY_COLOURS: tuple[Colour, Colour, Colour] = ((120, 170, 220), (170, 130, 220), (220, 220, 225))

@@ -90,13 +90,14 @@ def _arm(arm: ArmState, target: TrackedPose | None) -> tuple[float, ...]:
 
 
 def _latency_ms(frame: ControllerFrame | None, arms: ArmsState) -> tuple[float, float, float]:
-    """Network, solve, total; NaN where a clock was not read (0), as in a session solved offline."""
-    solve = 1e-6 * arms.solve_time_ns if arms.solve_time_ns > 0 else _NAN
-    if frame is None or frame.publish_time_ns <= 0:
+    """Network, solve, total; NaN where no clock was read, which is a 0 in the message: a session solved offline."""
+    if arms.publish_time_ns == 0:
+        return _NAN, _NAN, _NAN
+    solve = 1e-6 * arms.solve_time_ns
+    if frame is None or frame.publish_time_ns == 0:
         return _NAN, solve, _NAN
-    network = 1e-6 * (arms.receive_time_ns - frame.publish_time_ns) if arms.receive_time_ns > 0 else _NAN
-    total = 1e-6 * (arms.publish_time_ns - frame.publish_time_ns) if arms.publish_time_ns > 0 else _NAN
-    return network, solve, total
+    sent = frame.publish_time_ns
+    return 1e-6 * (arms.receive_time_ns - sent), solve, 1e-6 * (arms.publish_time_ns - sent)
 
 
 def row_of(frame: ControllerFrame | None, arms: ArmsState) -> tuple[float, ...]:

@@ -14,7 +14,7 @@ import rerun as rr
 
 from arm_ik_service.errors import ViewError
 from arm_ik_service.io.rerun_view.blueprint import blueprint_of
-from arm_ik_service.io.rerun_view.entities import Sender, entity_of, log_styles, skeleton_of
+from arm_ik_service.io.rerun_view.entities import Sender, entity_of, log_name, log_styles, skeleton_of
 from arm_ik_service.io.rerun_view.rows import Rows
 from arm_ik_service.io.rerun_view.sinks import Save, Sink, attach, first_line
 from arm_ik_service.wire.messages import ArmsState, ControllerFrame, Pose, Side, Skeleton
@@ -136,6 +136,9 @@ class RerunView:
         self._people[arms.avatar] = person
         log_styles(self._recording, root)
         person.sender.describe(*self._described.get(arms.avatar, (skeleton_of(arms), OPENXR_GRIP)))
+        if len(self._people) > 1:
+            for name, one in self._people.items():
+                log_name(self._recording, one.root, name)
         roots = {name: one.root for name, one in self._people.items()}
         self._recording.send_blueprint(blueprint_of(roots, [one.chest for one in self._people.values()]))
         return person
