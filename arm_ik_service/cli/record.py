@@ -62,6 +62,7 @@ def record(
 
         recorder = Recorder(bus, output, Keys(prefix), progress=progress)
         with stopped_by_signals(recorder.stop):
+            say("ready; Ctrl-C ends it")
             result = recorder.run(duration_s)
     if json_output:
         typer.echo(json.dumps(asdict(result)))

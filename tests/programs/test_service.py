@@ -48,7 +48,7 @@ def test_a_frame_older_than_the_last_is_refused_and_named_in_health(service: Ser
         stream.put(codec.encode(standing(seq, time_ns)))
         time.sleep(0.02)
     assert [answer.seq for answer in service.take(3, 2.0)] == [1, 3]
-    assert wait_for(lambda: service.healths[-1].refused == {"out_of_order": 1}, 3.0)
+    assert wait_for(lambda: service.healths[-1].refused == {"out_of_order": 1}, 3.0), service.healths[-1].refused
 
 
 def test_a_publisher_that_starts_again_with_an_older_clock_is_answered_again(service: Service) -> None:

@@ -8,10 +8,12 @@ import subprocess
 import time
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 from harness import COMMAND, Running, Service, wait_for
 
+from arm_ik_service.io.recording import RecordingWriter
 from arm_ik_service.io.session import open_session
 from arm_ik_service.programs.demo import bundled_session, free_endpoint
 
@@ -27,87 +29,69 @@ def recording() -> Path:
     return bundled_session("reach_and_grab")
 
 
-def test_a_replay_through_a_service_is_answered_frame_by_frame_and_verifies_bit_for_bit(
+def shortened(recording: Path, path: Path, seconds: float) -> Path:
+    """Write the first seconds of a recording as one of its own."""
+    with RecordingWriter(path) as writer:
+        for recorded in open_session(recording).frames():
+            if writer.message_count >= 72 * seconds:
+                break
+            writer.write_frame(recorded.avatar, recorded.frame, recorded.receive_time_ns or 0)
+    return path
+
+
+def test_a_replay_is_answered_frame_by_frame_recorded_as_it_was_and_solved_again_to_the_same_bytes(
     service: Service, recording: Path, tmp_path: Path
 ) -> None:
     copy = tmp_path / "copy.mcap"
     recorder = Running("record", str(copy), "--connect", service.endpoint)
-    time.sleep(2.0)
+    recorder.wait_ready()
     played = arm_ik("replay", str(recording), "--json", *FAST, "--connect", service.endpoint)
     assert played.returncode == 0, played.stderr
     frames = json.loads(played.stdout)["frames"]
-    answers = service.take(frames, 5.0)
-    overtaken = service.healths[-1].overtaken
-    assert len(answers) + overtaken == frames
-    assert overtaken <= 0.01 * frames  # three times the recorded pace on a shared machine; at pace it is 0.1 %
+    answers = service.take(frames, 3.0)
     assert recorder.end(signal.SIGINT) == 0
+    assert len(answers) >= 0.98 * frames  # at three times the recorded pace, on a machine that does other things
+    assert len({answer.seq for answer in answers}) == len(answers)
+
+    original = {recorded.frame.seq: recorded.frame for recorded in open_session(recording).frames()}
+    for recorded in open_session(copy).frames():
+        frame, before = recorded.frame, original[recorded.frame.seq]
+        assert msgspec.structs.replace(frame, publish_time_ns=before.publish_time_ns) == before
+
     solved = arm_ik("solve", str(copy), "--verify", "--json")
-    assert solved.returncode == 0, solved.stderr
+    assert solved.returncode == 0, solved.stdout + solved.stderr
     report = json.loads(solved.stdout)
-    assert report["compared"] == len(answers)
-    assert report["different"] == 0
-    assert report["unanswered"] == 0
+    assert (report["compared"], report["different"], report["unanswered"]) == (len(answers), 0, 0)
 
 
-def test_what_is_replayed_is_what_was_recorded(service: Service, recording: Path, tmp_path: Path) -> None:
-    copy = tmp_path / "copy.mcap"
-    recorder = Running("record", str(copy), "--connect", service.endpoint)
-    time.sleep(2.0)
-    assert arm_ik("replay", str(recording), *FAST, "--to", "6", "--connect", service.endpoint).returncode == 0
-    assert recorder.end() == 0
-    original = {r.frame.seq: r.frame for r in open_session(recording).frames()}
-    copied = [r.frame for r in open_session(copy).frames()]
-    assert len(copied) > 300
-    for frame in copied:
-        before = original[frame.seq]
-        assert (frame.head, frame.left, frame.right, frame.sample_time_ns) == (
-            before.head,
-            before.left,
-            before.right,
-            before.sample_time_ns,
-        )
-
-
-@pytest.mark.parametrize("victim", ["replay", "record", "view"])
-def test_killing_any_other_program_leaves_the_service_answering(
-    service: Service, recording: Path, tmp_path: Path, victim: str
-) -> None:
-    arguments = {
-        "replay": ["replay", str(recording), "--loop", "--avatar", "other"],
-        "record": ["record", str(tmp_path / "killed.mcap")],
-        "view": ["view", "--save", str(tmp_path / "killed.rrd")],
-    }
-    doomed = Running(*arguments[victim], "--connect", service.endpoint)
-    player = Running("replay", str(recording), "--to", "5", "--connect", service.endpoint)
-    assert wait_for(lambda: service.answers.qsize() > 100, 20.0)
-    doomed.popen.kill()
-    doomed.popen.wait()
-    assert player.finish() == 0
-    time.sleep(0.3)
-    own = [answer.seq for answer in service.take(10_000, 1.0) if answer.avatar != "other"]
-    sent = [r.frame for r in open_session(recording).frames()]
-    wanted = [frame.seq for frame in sent if frame.sample_time_ns - sent[0].sample_time_ns <= 5_000_000_000]
-    assert len(wanted) - len(own) <= 0.02 * len(wanted)
-    assert service.process.popen.poll() is None
-
-
-def test_a_recorder_killed_in_the_middle_leaves_a_log_that_plays(
+def test_killing_every_other_program_leaves_the_service_answering_and_a_log_that_plays(
     service: Service, recording: Path, tmp_path: Path
 ) -> None:
     log = tmp_path / "killed.mcap"
-    recorder = Running("record", str(log), "--connect", service.endpoint)
-    player = Running("replay", str(recording), "--connect", service.endpoint)
-    assert wait_for(lambda: service.answers.qsize() > 400, 20.0)
-    recorder.popen.kill()
-    recorder.popen.wait()
-    player.end()
-    service.take(10_000, 1.0)
-    played = arm_ik("replay", str(log), "--speed", "3", "--avatar", "again", "--json", "--connect", service.endpoint)
+    connect = ["--connect", service.endpoint]
+    doomed = [
+        Running("replay", str(recording), "--loop", "--avatar", "other", *connect),
+        Running("record", str(log), *connect),
+        Running("view", "--save", str(tmp_path / "killed.rrd"), *connect),
+    ]
+    for process in doomed[1:]:
+        process.wait_ready()
+    player = Running("replay", str(recording), "--to", "5", *connect)
+    assert wait_for(lambda: service.answers.qsize() > 300, 20.0)
+    for process in doomed:
+        process.popen.kill()
+        process.popen.wait()
+        time.sleep(0.3)
+    assert player.finish() == 0
+    own = [answer for answer in service.take(10_000, 0.5) if answer.avatar != "other"]
+    sent = sum(recorded.frame.seq <= own[-1].seq for recorded in open_session(recording).frames())
+    assert sent > 300
+    assert len(own) >= 0.98 * sent
+    assert service.process.popen.poll() is None
+
+    played = arm_ik("replay", str(log), "--speed", "5", "--avatar", "again", "--json", *connect)
     assert played.returncode == 0, played.stderr
-    frames = json.loads(played.stdout)["frames"]
-    assert frames > 150
-    again = [answer for answer in service.take(frames, 3.0) if answer.avatar == "again"]
-    assert len(again) >= 0.98 * frames
+    assert json.loads(played.stdout)["frames"] > 100
 
 
 def test_a_replay_started_before_the_service_waits_and_then_plays(recording: Path) -> None:
@@ -147,8 +131,7 @@ def test_solving_twice_gives_the_same_bytes(tmp_path: Path, recording: Path) -> 
 
 
 def test_the_demo_ends_with_its_summary(tmp_path: Path, recording: Path) -> None:
-    short = tmp_path / "short.mcap"
-    assert arm_ik("convert", str(recording), str(short)).returncode == 0
+    short = shortened(recording, tmp_path / "short.mcap", 2.0)
     picture = tmp_path / "demo.rrd"
     result = arm_ik("demo", str(short), "--save", str(picture))
     assert result.returncode == 0, result.stderr
