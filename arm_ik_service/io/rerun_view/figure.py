@@ -73,13 +73,13 @@ def forearm(side: Side, length_m: float) -> Solid:
 
 def hand(side: Side, length_m: float) -> Solid:
     """A hand closed around a grip, thumb along it: shows the side, the palm and the pronation. White, to be tinted."""
-    parts = [rounded_box((0.041, 0.015, 0.047), WHITE, roundness=0.55).moved((0.0, -0.002, -0.052))]
-    bend = ((-0.57, 0.82), (0.77, 0.64), (0.98, -0.17))  # z and -y of the three phalanges: 55, 140, 190 degrees
+    parts = [rounded_box((0.041, 0.015, 0.043), WHITE, roundness=0.55).moved((0.0, -0.002, -0.047))]
+    bend = ((-0.34, 0.94), (0.94, 0.34), (0.82, -0.57))  # z and -y of the three phalanges: 70, 160, 215 degrees
     for x, z, phalanges, radius in (
-        (-0.032, -0.091, (0.042, 0.027, 0.020), 0.0100),
-        (-0.011, -0.095, (0.046, 0.030, 0.021), 0.0105),
-        (0.010, -0.091, (0.042, 0.028, 0.020), 0.0100),
-        (0.030, -0.082, (0.034, 0.021, 0.018), 0.0088),
+        (-0.032, -0.084, (0.042, 0.027, 0.020), 0.0100),
+        (-0.011, -0.087, (0.046, 0.030, 0.021), 0.0105),
+        (0.010, -0.084, (0.042, 0.028, 0.020), 0.0100),
+        (0.030, -0.076, (0.036, 0.022, 0.018), 0.0088),
     ):
         point = (x, -0.004, z)
         for (forward, down), phalanx in zip(bend, phalanges, strict=True):
