@@ -10,6 +10,7 @@ import sys
 
 import typer
 
+from arm_ik_service.cli.bench import bench
 from arm_ik_service.cli.bridge import bridge
 from arm_ik_service.cli.convert import convert
 from arm_ik_service.cli.demo import demo
@@ -32,6 +33,7 @@ app = typer.Typer(
 )
 for command in (demo, serve, replay, record, view, solve, convert, export, schema):
     app.command()(command)
+app.add_typer(bench)
 app.add_typer(bridge, name="bridge")
 
 

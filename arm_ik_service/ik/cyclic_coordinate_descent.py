@@ -1,12 +1,12 @@
 """Cyclic coordinate descent: one joint at a time turns to where it alone serves the hand best.
 
-Wang & Chen, A combined optimization method for solving the inverse kinematics problems of mechanical manipulators, IEEE
-Transactions on Robotics and Automation 7(4), 1991. Both parts of the cost are theirs: squared distance, and how far the
-hand's three axes are from the target's. The rotation's part, lam (3 - trace), is lam angle^2 to second order, the metric
-of the other solvers.
+Wang & Chen, A combined optimization method for solving the inverse kinematics problems of mechanical manipulators,
+IEEE Transactions on Robotics and Automation 7(4), 1991. Both parts of the cost are theirs: squared distance, and how
+far the hand's three axes are from the target's. The rotation's part, lam (3 - trace), is lam angle^2 to second order,
+the metric of the other solvers.
 
-For a hinge the cost over its angle is a sinusoid, so its best angle within its range is known in closed form. The ball of
-the shoulder is one coordinate too: its best rotation is Wahba's problem, solved by a singular value decomposition
+For a hinge the cost over its angle is a sinusoid, so its best angle within its range is known in closed form. The ball
+of the shoulder is one coordinate too: its best rotation is Wahba's problem, solved by a singular value decomposition
 (Kabsch, Acta Crystallographica A32, 1976).
 """
 
@@ -73,38 +73,39 @@ class CyclicCoordinateDescent(PinocchioSolver):
 
     def _turn_hinge(self, q: Array, hinge: int, target: pin.SE3) -> None:
         """Set one hinge to its best angle within its range, in place."""
-        column = self._columns(q)[:, 3 + hinge]
-        axis = column[3:]
-        hand = self.data.oMi[WRIST]
-        joint = self.data.oMi[2 if hinge < 3 else WRIST].translation
-        lam = self.rotation_weight_m**2
-        # what a turn by x leaves of the cost is a constant less (along cos x + across sin x)
-        along = across = 0.0
-        pairs = [(1.0, hand.translation - joint, target.translation - joint)]
-        pairs += [(0.5 * lam, hand.rotation[:, i], target.rotation[:, i]) for i in range(3)]
-        for weight, here, there in pairs:
-            along += weight * float(here @ there - (axis @ here) * (axis @ there))
-            across += weight * float(axis @ np.cross(here, there))
-        best = q[4 + hinge] + math.atan2(across, along)
-        q[4 + hinge] = nearest_within(best, self.arm.lower[hinge], self.arm.upper[hinge])
+        pin.computeJointJacobians(self.model, self.data, q)
+        columns = pin.getJointJacobian(self.model, self.data, WRIST, pin.LOCAL_WORLD_ALIGNED)
+        axis = columns[3:, 3 + hinge]
+        m = self._correlation(2 if hinge < 3 else WRIST, target)
+        # a turn by x about the axis leaves of the cost a constant less 2 (along cos x + across sin x)
+        along = float(np.trace(m) - axis @ m @ axis)
+        across = float(axis @ (m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]))
+        best = float(q[4 + hinge]) + math.atan2(across, along)
+        chain = self.arm.chains[0]
+        q[4 + hinge] = nearest_within(best, chain.lower[hinge], chain.upper[hinge])
 
     def _turn_ball(self, q: Array, target: pin.SE3) -> Array:
-        """Return the configuration with the shoulder at its best rotation, or as far towards it as limits let it help."""
-        pin.forwardKinematics(self.model, self.data, q)
-        hand = self.data.oMi[WRIST]
-        lam = self.rotation_weight_m**2
-        spread = np.outer(target.translation, hand.translation) + 0.5 * lam * target.rotation @ hand.rotation.T
-        u, _, vt = np.linalg.svd(spread)
+        """Return the configuration with the shoulder at its best rotation, or as near to it as limits let it help."""
+        here = self._cost(q, target)
+        u, _, vt = np.linalg.svd(self._correlation(1, target))
         turn = pin.log3(u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt)  # in the shoulder frame
         in_humerus = self.data.oMi[1].rotation.T @ turn
-        here = self._cost(q, target)
         for k in range(RETREATS):
-            ahead = q.copy()
             step = np.concatenate([0.5**k * in_humerus, np.zeros(6)])
             ahead = self.arm.clamp(pin.integrate(self.model, q, step))
             if self._cost(ahead, target) < here:
                 return ahead
         return q
+
+    def _correlation(self, joint: int, target: pin.SE3) -> Array:
+        """Sum (3, 3) of there * here^T over the hand's position and axes, weighted, as seen from a joint's centre.
+
+        A rotation R of the joint then changes the cost by -2 trace(R^T M): all that any of them needs to know.
+        """
+        hand, centre = self.data.oMi[WRIST], self.data.oMi[joint].translation
+        rotations = target.rotation @ hand.rotation.T
+        positions = np.outer(target.translation - centre, hand.translation - centre)
+        return np.asarray(positions + 0.5 * self.rotation_weight_m**2 * rotations)
 
     def _cost(self, q: Array, target: pin.SE3) -> float:
         """What a sweep lowers [m^2]: squared distance and lam (3 - trace of the rotation that is left)."""
@@ -112,11 +113,6 @@ class CyclicCoordinateDescent(PinocchioSolver):
         hand = self.data.oMi[WRIST]
         gap = target.translation - hand.translation
         return float(gap @ gap + self.rotation_weight_m**2 * (3.0 - np.sum(target.rotation * hand.rotation)))
-
-    def _columns(self, q: Array) -> Array:
-        """Unweighted Jacobian (6, 9): below, the axes of the joints as they stand."""
-        pin.computeJointJacobians(self.model, self.data, q)
-        return np.asarray(pin.getJointJacobian(self.model, self.data, WRIST, pin.LOCAL_WORLD_ALIGNED))
 
 
 def nearest_within(angle: float, lower: float, upper: float) -> float:

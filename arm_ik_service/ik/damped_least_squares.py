@@ -21,8 +21,8 @@ class DampedLeastSquares(JacobianSolver):
     """dq = J^T (J J^T + mu I)^-1 e: minimises |e - J dq|^2 + mu |dq|^2 (Tikhonov).
 
     `damping` "fixed": mu = `damping_m`^2. "error_scaled": mu = |e|^2 / 2 + `damping_m`^2, so that it is careful far
-    from the target, where the linearisation is poor, and quick near it. Every row of J is in metres a radian, so mu is a
-    squared length: singular directions whose lever is shorter than `damping_m` are left alone.
+    from the target, where the linearisation is poor, and quick near it. Every row of J is in metres a radian, so mu is
+    a squared length: singular directions whose lever is shorter than `damping_m` are left alone.
     """
 
     def __init__(

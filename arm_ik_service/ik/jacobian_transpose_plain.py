@@ -4,8 +4,8 @@ Wolovich & Elliott, A computational technique for inverse kinematics, CDC 1984; 
 control of robotic manipulators, IFAC 1984. The step rule is Buss, Introduction to inverse kinematics with Jacobian
 transpose, pseudoinverse and damped least squares methods, 2004, section 4.
 
-J^T e is the gradient of half the squared residual, so this is steepest descent: it cannot blow up at a singularity, and it
-crawls wherever the Jacobian's columns differ much in length. It is here to show what `conjugate` gains.
+J^T e is the gradient of half the squared residual, so this is steepest descent: it cannot blow up at a singularity,
+and it crawls wherever the Jacobian's columns differ much in length. It is here to show what `conjugate` gains.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from arm_ik_service.ik.pinocchio_loop import Array, JacobianSolver
 class JacobianTransposePlain(JacobianSolver):
     """dq = alpha J^T e.
 
-    `rule` "buss": alpha = <e, J J^T e> / <J J^T e, J J^T e>, the exact minimum along the step of the linearised problem.
+    `rule` "buss": alpha = <e, J J^T e> / <J J^T e, J J^T e>, the minimum along the step of the linearised problem.
     `rule` "fixed": alpha = `gain` [rad per m^2 of J^T e]; stable below 2 / sigma_max(J)^2, which a stretched adult arm
     brings down to 4, a tall one to 3.
     """

@@ -1,7 +1,7 @@
-"""What the solvers written with Pinocchio calls share: the residual, the limits, and the loop that keeps the best so far.
+"""What the solvers written with Pinocchio calls share: residual, limits, and the loop that keeps the best so far.
 
-These solvers are the field beside the compiled `JacobianTranspose`, written to be read. Each is one way to choose a step;
-all of them measure the same residual, hold the same limits, stop at the same tolerances and spend a bounded budget.
+These solvers are the field beside the compiled `JacobianTranspose`, written to be read. Each is one way to choose a
+step; all of them measure the same residual, hold the same limits, stop at the same tolerances and keep to a budget.
 
 The residual (6,) is in metres: the position error, then the rotation error times `rotation_weight_m`, both in the axes
 of the shoulder frame. The Jacobian (6, 9) has its rows weighted the same way, so that every length, step and damping

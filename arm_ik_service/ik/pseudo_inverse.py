@@ -1,9 +1,9 @@
 """The pseudo-inverse: the smallest step that removes the residual of the linearised problem.
 
 Whitney, Resolved motion rate control of manipulators and human prostheses, IEEE Transactions on Man-Machine Systems
-10(2), 1969. Gauss-Newton, so it converges in a few steps away from singularities. At one, the smallest singular values are
-inverted into huge steps; here they are cut off at `LARGEST_STEP` in length, which keeps the arm in one piece and leaves
-the method's trembling there as it is.
+10(2), 1969. Gauss-Newton, so it converges in a few steps away from singularities. At one, the smallest singular
+values are inverted into huge steps; here they are cut off at `LARGEST_STEP` in length, which keeps the arm in one piece
+and leaves the method's trembling there as it is.
 """
 
 from __future__ import annotations

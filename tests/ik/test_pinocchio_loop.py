@@ -17,11 +17,12 @@ from arm_ik_service.ik.solver import Status
 
 Array = npt.NDArray[np.float64]
 
-# Every method with the share of random reachable targets that it meets within its default budget: cold, started at rest
-# half the workspace away, and warm, started 0.05 rad a joint away. Measured on 300 poses, less a margin for the 60 here.
+# Every method with the share of random reachable targets that it must meet within its default budget: cold, from rest,
+# and warm, from 0.05 rad a joint away. On 300 poses they met, cold and warm: Buss 0.78 0.99, fixed 0.49 0.94,
+# pseudo-inverse 0.93 1.00, measured 0.91 1.00, error-scaled 0.92 1.00, fixed damping 0.93 1.00, cyclic 0.89 0.99.
 FIELD: dict[str, tuple[str, dict[str, Any], float, float]] = {
-    "transpose, Buss": ("jacobian_transpose_plain", {}, 0.55, 0.93),
-    "transpose, fixed": ("jacobian_transpose_plain", {"rule": "fixed"}, 0.25, 0.80),
+    "transpose, Buss": ("jacobian_transpose_plain", {}, 0.65, 0.95),
+    "transpose, fixed": ("jacobian_transpose_plain", {"rule": "fixed"}, 0.35, 0.85),
     "pseudo-inverse": ("pseudo_inverse", {}, 0.80, 0.96),
     "pseudo-inverse, measured": ("pseudo_inverse", {"jacobian": "finite_differences", "gain": 0.7}, 0.80, 0.96),
     "damped, error-scaled": ("damped_least_squares", {}, 0.85, 0.96),
@@ -206,5 +207,5 @@ def test_a_time_limit_that_has_passed_gives_the_best_so_far_and_says_so(arm: Arm
 def test_a_budget_or_tolerance_that_cannot_be_kept_is_refused(arm: ArmModel, options: dict[str, Any]) -> None:
     from arm_ik_service.ik.damped_least_squares import DampedLeastSquares
 
-    with pytest.raises(ValueError, match="needed|positive"):
+    with pytest.raises(ValueError, match=r"needed|positive"):
         DampedLeastSquares(arm, **options)

@@ -10,8 +10,14 @@ from arm_ik_service.errors import SettingsError
 from arm_ik_service.ik.cyclic_coordinate_descent import CyclicCoordinateDescent
 from arm_ik_service.ik.damped_least_squares import DampedLeastSquares
 from arm_ik_service.ik.registry import SOLVERS, make_solver, options_of, parse_solver
+from arm_ik_service.ik.solver import Solver
 
 ARM = ArmModel.load()
+
+
+def build(text: str) -> Solver:
+    choice = parse_solver(text)
+    return make_solver(choice.name, ARM, **choice.options)
 
 
 @pytest.mark.parametrize("name", SOLVERS)
@@ -38,9 +44,8 @@ def test_options_are_read_from_text_as_what_they_are() -> None:
 
 def test_a_choice_reads_back_as_it_is_written() -> None:
     for text in ("pseudo_inverse", "pseudo_inverse:jacobian=finite_differences,gain=0.5"):
-        choice = parse_solver(text)
-        assert choice.label == text
-        make_solver(choice.name, ARM, **choice.options)
+        assert parse_solver(text).label == text
+        build(text)
 
 
 @pytest.mark.parametrize(
@@ -59,5 +64,4 @@ def test_a_choice_reads_back_as_it_is_written() -> None:
 )
 def test_a_mistake_names_what_is_wrong_and_what_is_known(text: str, what: str) -> None:
     with pytest.raises(SettingsError, match=what):
-        choice = parse_solver(text)
-        make_solver(choice.name, ARM, **choice.options)
+        build(text)

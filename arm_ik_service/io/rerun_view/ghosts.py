@@ -1,7 +1,7 @@
 """Several solvers' arms in one picture: a stick arm a solver, each in its own colour, beside the target's axes.
 
-Paths: `<session>/<side>/<solver>` with the arm from shoulder over elbow to wrist, `<session>/<side>/target` with the hand
-asked for, and `residual_mm/<solver>` over time. Timeline `frame`.
+Below `<session>/<side>/`: `<solver>`, the arm from shoulder over elbow to wrist; `target`, the hand asked for;
+`residual_mm/<solver>`, how far the hand is off. Timeline `frame`.
 """
 
 from __future__ import annotations
