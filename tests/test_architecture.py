@@ -29,14 +29,14 @@ ROOMS: dict[str, set[str]] = {
     "exports": {*FOUNDATION, "geometry", "wire", "body"},
     "bridges": {*FOUNDATION, "geometry", "wire", "body", "io"},
 }
-EVERYTHING = {"programs", "cli", "__init__", "__main__"}  # these put the rest together
+EVERYTHING = {"programs", "bench", "cli", "__init__", "__main__"}  # these put the rest together
 
 # a library that only one kind of module may import
 OWNERS: dict[str, str | tuple[str, ...]] = {
     "zenoh": "io.zenoh_",
     "rerun": "io.rerun_view",
     "mcap": ("io.recording", "exports.mcap_files"),
-    "pinocchio": ("arm.", "ik."),
+    "pinocchio": ("arm.", "ik.", "bench.peers"),
     "pythonosc": "exports.osc",
     "rosbags": "exports.ros2",
     "foxglove": ("exports.foxglove_messages", "exports.mcap_files"),
