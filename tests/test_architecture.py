@@ -40,7 +40,7 @@ OWNERS: dict[str, str | tuple[str, ...]] = {
     "pythonosc": "exports.osc",
     "rosbags": "exports.ros2",
     "foxglove": ("exports.foxglove_messages", "exports.mcap_files"),
-    "pyarrow": ("exports.table", "io.rerun_view"),
+    "pyarrow": "exports.table",
     "typer": "cli",
     "rich": "cli",
     "numba": ("compiled", "ik.clock"),  # the clock of a solver's time limit is an LLVM intrinsic
