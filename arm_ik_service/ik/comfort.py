@@ -8,6 +8,7 @@ Xia recordings. Near a limit discomfort rises steeply, so that the elbow makes w
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from arm_ik_service.arm.chain import Columns
@@ -19,18 +20,22 @@ from arm_ik_service.ik.swivel import Posture, Reach, posture_at, violation
 COMFORT: dict[str, float] = {
     "pronation_rest": 1.11,
     "pronation_weight": 0.05,
-    "wrist_flexion_rest": 0.0,
-    "wrist_flexion_weight": 0.48,
-    "deviation_rest": 0.0,
+    "flexion_weight": 0.48,
+    "flexion_scale": 3.0,
     "deviation_weight": 1.57,
-    "twist_rest": -0.36,
+    "deviation_scale": 3.0,
     "twist_weight": 0.25,
+    "twist_rest": -0.36,
+    "twist_forward": 0.0,
+    "twist_up": 0.0,
+    "twist_out": 0.0,
     "pull_down": 0.86,
     "pull_out": 0.74,
     "pull_forward": 0.11,
+    "limit_margin": 0.05,
+    "limit_weight": 3.0,
+    "twist_scale": 3.0,
 }
-LIMIT_MARGIN = 0.12  # [rad] ahead of a limit where discomfort begins to rise
-LIMIT_WEIGHT = 12.0  # [1/rad^2] how steeply
 _PROBE = 0.06  # [rad] swivel difference for slope and curvature
 
 
@@ -39,17 +44,18 @@ def discomfort(comfort: Any, chain: Record, posture: Posture) -> float:
     """How far a posture is from comfortable; no unit, only differences mean anything. `comfort` is COMFORT's values."""
     upper_arm, _, pronation, flexion, deviation = posture
     y = upper_arm[1]
-    p, f, d = pronation - comfort[0], flexion - comfort[2], deviation - comfort[4]
-    t = twist_of(upper_arm) - comfort[6]
+    p = pronation - comfort[0]
+    f, d = flexion / comfort[3], deviation / comfort[5]
+    t = twist_of(upper_arm) - comfort[7] + comfort[8] * y[0] + comfort[9] * y[1] + comfort[10] * y[2]
     return (
         comfort[1] * p * p
-        + comfort[3] * f * f
-        + comfort[5] * d * d
-        + comfort[7] * t * t
-        - comfort[8] * y[1]
-        + comfort[9] * y[2]
-        + comfort[10] * y[0]
-        + LIMIT_WEIGHT * violation(chain, posture, LIMIT_MARGIN)
+        + comfort[2] * comfort[3] * comfort[3] * math.log(1.0 + f * f)
+        + comfort[4] * comfort[5] * comfort[5] * math.log(1.0 + d * d)
+        + comfort[6] * comfort[16] * comfort[16] * math.log(1.0 + t * t / (comfort[16] * comfort[16]))
+        - comfort[11] * y[1]
+        + comfort[12] * y[2]
+        + comfort[13] * y[0]
+        + comfort[15] * violation(chain, posture, comfort[14])
     )
 
 

@@ -18,15 +18,17 @@ from arm_ik_service.compiled import Record, compiled
 from arm_ik_service.geometry.scalar import Vector, clip, exp, multiply, scale
 from arm_ik_service.ik.clock import monotonic_ns
 from arm_ik_service.ik.comfort import discomfort, slope_and_curvature
-from arm_ik_service.ik.conjugate import NEAREST, OUT_OF_TIME, SOLVED, converge
+from arm_ik_service.ik.conjugate import OUT_OF_ITERATIONS, OUT_OF_TIME, SOLVED, converge
 from arm_ik_service.ik.swivel import Reach, posture_at, reach_to, swivel_of, take, violation
 
 SEEDS = 24  # swivels looked at when there is no good start: every 15 degrees
 FLAT = 0.3  # curvature below which discomfort counts as flat: Newton's step would be too long
+GIVE_TIME_S = 0.3  # in which the carrying angle and the wrist's axial play come back to zero
 HALF_SURE = 1.0  # curvature at which the elbow's confidence is one half
 STUCK_M, STUCK_RAD = 2e-3, 0.02  # a hand further off than this is worth another start
 POSITION_FIRST = 0.01  # share of the rotation's weight that is left once the target is known to be out of reach
 _NEARNESS = 0.02  # [1/rad] what a far swivel must gain to be preferred to a near one
+_ROOM = 0.1  # [rad] to the limits, wanted of the second other start
 _BETTER = 0.5  # a new start must at least halve the error: no alternation between two that are as good
 
 
@@ -38,14 +40,23 @@ def turn_to_comfort(arm: Record, settings: Record, reach: Reach, rotation: Colum
     swivel = swivel_of(reach, columns_of(shoulder))
     slope, curvature = slope_and_curvature(arm.comfort, chain, reach, rotation, swivel)
     arm.elbow_confidence = max(curvature, 0.0) / (max(curvature, 0.0) + HALF_SURE)
-    share = 1.0 - math.exp(-dt_s / settings.swivel_time_s) if settings.swivel_time_s > 0.0 else 1.0
-    most = settings.swivel_speed_rad_s * dt_s
-    turn = clip(-share * slope / max(abs(curvature), FLAT), -most, most)
+    # A critically damped follower, so that the swivel's speed is continuous and its lag is swivel_time_s.
+    away = -slope / max(abs(curvature), FLAT)
+    stiff = 2.0 * dt_s / max(settings.swivel_time_s, 1e-6)
+    speed = (arm.swivel_speed + stiff * stiff / dt_s * away) / (1.0 + 2.0 * stiff + stiff * stiff)
+    gain = settings.swivel_acceleration_rad_s2 * dt_s
+    speed = clip(speed, arm.swivel_speed - gain, arm.swivel_speed + gain)
+    speed = clip(speed, -settings.swivel_speed_rad_s, settings.swivel_speed_rad_s)
+    arm.swivel_speed = speed
+    turn = speed * dt_s
     shoulder = multiply(exp(scale(turn, reach[0][0])), shoulder)
     shoulder = clamp_swing(chain, shoulder, columns_of(shoulder))
     shoulder = clamp_twist(chain, shoulder, columns_of(shoulder))
     for i in range(4):
         q[i] = shoulder[i]
+    back = dt_s / (dt_s + GIVE_TIME_S)
+    q[5] = clip(q[5] * (1.0 - back), chain.lower[1], chain.upper[1])
+    q[9] = clip(q[9] * (1.0 - back), chain.lower[5], chain.upper[5])
 
 
 @compiled
@@ -61,12 +72,14 @@ def most_comfortable(arm: Record, reach: Reach, rotation: Columns) -> float:
 
 
 @compiled
-def nearest_possible(chain: Record, reach: Reach, rotation: Columns, swivel: float) -> float:
-    """Return the swivel nearest to a given one at which the limits are kept, or least broken."""
+def nearest_possible(
+    chain: Record, reach: Reach, rotation: Columns, swivel: float, margin: float, nearness: float
+) -> float:
+    """Return the swivel near a given one at which limits drawn in by `margin` [rad] are kept, or least broken."""
     best, least = swivel, math.inf
     for i in range(SEEDS):
         step = (i - SEEDS // 2) * (2.0 * math.pi / SEEDS)
-        cost = violation(chain, posture_at(reach, rotation, swivel + step), 0.0) + _NEARNESS * abs(step)
+        cost = violation(chain, posture_at(reach, rotation, swivel + step), margin) + nearness * abs(step)
         if cost < least:
             best, least = swivel + step, cost
     return best
@@ -92,44 +105,36 @@ def _converge(
 
 
 @compiled
-def reach_target(arm: Record, settings: Record, position: Vector, rotation: Columns, reach: Reach) -> None:
-    """Bring the hand onto the target from the configuration at hand: steps 2 to 4. Leaves the outcome in `arm`."""
+def reach_target(
+    arm: Record,
+    settings: Record,
+    position: Vector,
+    rotation: Columns,
+    reach: Reach,
+    stuck_m: float,
+    stuck_rad: float,
+) -> None:
+    """Bring the hand onto the target from the configuration at hand: steps 2 to 4. Leaves the outcome in `arm`.
+
+    A hand left further off than `stuck_m` or `stuck_rad` is worth another start.
+    """
     arm.restarted = 0
-    chain, work, q, kept = arm.chain, arm.work, arm.configuration, arm.kept
+    work = arm.work
     deadline = 0
     if settings.time_limit_us > 0.0:
         deadline = monotonic_ns() + int(1e3 * settings.time_limit_us)
     budget = settings.iterations
-    status = _converge(arm, settings, position, rotation, budget, 1.0, deadline)
+    status = _converge(arm, settings, position, rotation, (2 * budget + 2) // 3, 1.0, deadline)
     used = work.iterations
-    if status == SOLVED or status == OUT_OF_TIME:
-        arm.status = status
-        return
-
-    if work.position_error_m > STUCK_M or work.orientation_error_rad > STUCK_RAD:
-        lam = settings.rotation_weight_m * settings.rotation_weight_m
-        before = work.position_error_m**2 + lam * work.orientation_error_rad**2
-        position_error, orientation_error, held = work.position_error_m, work.orientation_error_rad, work.held
-        for i in range(10):
-            kept[i] = q[i]
-        swivel = swivel_of(reach, columns_of((q[0], q[1], q[2], q[3])))
-        take(chain, posture_at(reach, rotation, nearest_possible(chain, reach, rotation, swivel)), q)
-        clamped = clamp_swing(chain, (q[0], q[1], q[2], q[3]), columns_of((q[0], q[1], q[2], q[3])))
-        clamped = clamp_twist(chain, clamped, columns_of(clamped))
-        for i in range(4):
-            q[i] = clamped[i]
-        again = _converge(arm, settings, position, rotation, max(budget - used, 0), 1.0, deadline)
+    for attempt in range(2):
+        if _finished(status) or (work.position_error_m <= stuck_m and work.orientation_error_rad <= stuck_rad):
+            break
+        margin, nearness = (0.0, _NEARNESS) if attempt == 0 else (_ROOM, 0.0)
+        status, used = _start_again(arm, settings, position, rotation, reach, margin, nearness, used, status, deadline)
+    if status == OUT_OF_ITERATIONS and work.position_error_m <= STUCK_M:
+        status = _converge(arm, settings, position, rotation, max(budget - used, 0), 1.0, deadline)
         used += work.iterations
-        after = work.position_error_m**2 + lam * work.orientation_error_rad**2
-        if after < _BETTER * before:
-            status = again
-            arm.restarted = 1
-        else:
-            for i in range(10):
-                q[i] = kept[i]
-            work.position_error_m, work.orientation_error_rad, work.held = position_error, orientation_error, held
-
-    if status == NEAREST and work.position_error_m > settings.position_tolerance_m:
+    if not _finished(status) and work.position_error_m > settings.position_tolerance_m:
         _converge(arm, settings, position, rotation, max(budget - used, 0), POSITION_FIRST, deadline)
         used += work.iterations
     work.iterations = used
@@ -137,20 +142,62 @@ def reach_target(arm: Record, settings: Record, position: Vector, rotation: Colu
 
 
 @compiled
+def _finished(status: int) -> bool:
+    return status == SOLVED or status == OUT_OF_TIME  # noqa: PLR1714, SIM109  numba compiles no `in` here as cheaply
+
+
+@compiled
+def _start_again(
+    arm: Record,
+    settings: Record,
+    position: Vector,
+    rotation: Columns,
+    reach: Reach,
+    margin: float,
+    nearness: float,
+    used: int,
+    status: int,
+    deadline: int,
+) -> tuple[int, int]:
+    """Try the closed form at another possible swivel; keep it if it is clearly better. Return status, iterations."""
+    chain, work, q, kept = arm.chain, arm.work, arm.configuration, arm.kept
+    lam = settings.rotation_weight_m * settings.rotation_weight_m
+    before = work.position_error_m**2 + lam * work.orientation_error_rad**2
+    position_error, orientation_error, held = work.position_error_m, work.orientation_error_rad, work.held
+    for i in range(10):
+        kept[i] = q[i]
+    swivel = swivel_of(reach, columns_of((q[0], q[1], q[2], q[3])))
+    swivel = nearest_possible(chain, reach, rotation, swivel, margin, nearness)
+    take(chain, posture_at(reach, rotation, swivel), q)
+    left = max(settings.iterations - used, 0)
+    again = _converge(arm, settings, position, rotation, (2 * left + 2) // 3, 1.0, deadline)
+    used += work.iterations
+    if work.position_error_m**2 + lam * work.orientation_error_rad**2 < _BETTER * before:
+        arm.restarted = 1
+        arm.swivel_speed = 0.0
+        return again, used
+    for i in range(10):
+        q[i] = kept[i]
+    work.position_error_m, work.orientation_error_rad, work.held = position_error, orientation_error, held
+    return status, used
+
+
+@compiled
 def step_frame(arm: Record, settings: Record, position: Vector, rotation: Columns, dt_s: float) -> None:
     """Take one frame: `position` and `rotation` of the hand bone, right arm, ISB axes."""
     reach = reach_to(arm.chain, position)
     turn_to_comfort(arm, settings, reach, rotation, dt_s)
-    reach_target(arm, settings, position, rotation, reach)
+    reach_target(arm, settings, position, rotation, reach, STUCK_M, STUCK_RAD)
 
 
 @compiled
 def first_frame(arm: Record, settings: Record, position: Vector, rotation: Columns) -> None:
     """Take a frame without a past: start at the most comfortable swivel."""
+    arm.swivel_speed = 0.0
     reach = reach_to(arm.chain, position)
     take(
         arm.chain,
         posture_at(reach, rotation, most_comfortable(arm, reach, rotation)),
         arm.configuration,
     )
-    reach_target(arm, settings, position, rotation, reach)
+    reach_target(arm, settings, position, rotation, reach, STUCK_M, STUCK_RAD)

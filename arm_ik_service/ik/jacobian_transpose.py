@@ -95,7 +95,7 @@ def _solve(arms: Any, settings: Any, target: Any, start: Any, configuration: Any
         arm.configuration[i] = start[i]
     position = position_to_arm(chain, (target[0], target[1], target[2]))
     rotation = columns_of(hand_to_arm(chain, (target[3], target[4], target[5], target[6])))
-    reach_target(arm, settings[0], position, rotation, reach_to(chain, position))
+    reach_target(arm, settings[0], position, rotation, reach_to(chain, position), 0.0, 0.0)
     for i in range(10):
         configuration[i] = arm.configuration[i]
     outcome[0], outcome[1], outcome[2] = work.iterations, work.position_error_m, work.orientation_error_rad
@@ -118,6 +118,7 @@ def _track(
 ) -> None:
     arm, setting = arms[0], settings[0]
     chain, work = arm.chain, arm.work
+    arm.swivel_speed = 0.0
     for i in range(10):
         arm.configuration[i] = start[i]
     for n in range(len(targets)):

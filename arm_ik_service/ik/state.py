@@ -22,6 +22,7 @@ ARM = record_dtype(
         ("started", np.int64),  # frames since the arm was at rest: 0, 1 or 2
         ("before", np.float64, (10,)),  # configuration one frame ago
         ("recent_velocity", np.float64, (9,)),  # mean over the last frame
+        ("swivel_speed", np.float64),  # [rad/s] of the elbow about the arm's line, for comfort
         ("kept", np.float64, (10,)),  # the best so far while another start is tried
         # the answer; positions and rotations in the shoulder frame of the arm's own side
         ("configuration", np.float64, (10,)),
@@ -55,6 +56,7 @@ def initialise_arm(arm: Record, model: ArmModel) -> None:
     arm["before"] = model.rest
     arm["velocity"] = 0.0
     arm["recent_velocity"] = 0.0
+    arm["swivel_speed"] = 0.0
 
 
 def new_arm(model: ArmModel) -> npt.NDArray[Any]:

@@ -14,8 +14,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from arm_ik_service.arm.chain import Columns, turn
-from arm_ik_service.arm.limits import swing_excess, twist_excess, twist_of
+from arm_ik_service.arm.chain import Columns, columns_of, turn
+from arm_ik_service.arm.limits import clamp_swing, clamp_twist, swing_excess, twist_excess, twist_of
 from arm_ik_service.compiled import Record, compiled
 from arm_ik_service.geometry.scalar import Vector, clip, cross, dot, from_columns, norm, scale, subtract
 
@@ -95,9 +95,10 @@ def violation(chain: Record, posture: Posture, margin: float) -> float:
 
 @compiled
 def take(chain: Record, posture: Posture, configuration: Any) -> None:
-    """Write a posture into a configuration (10,), held to the hinges' ranges."""
+    """Write a posture into a configuration (10,), brought inside all limits."""
     upper_arm, flexion, pronation, wrist_flexion, deviation = posture
-    q = from_columns(*upper_arm)
+    q = clamp_swing(chain, from_columns(*upper_arm), upper_arm)
+    q = clamp_twist(chain, q, columns_of(q))
     for i in range(4):
         configuration[i] = q[i]
     configuration[4] = clip(flexion, chain.lower[0], chain.upper[0])
