@@ -7,8 +7,8 @@ from functools import lru_cache
 import numpy as np
 
 from arm_ik_service.arm.model import ANGLES, LIMITS, ArmModel
-from arm_ik_service.body.profile import Profile
-from arm_ik_service.wire.messages import VERSION, JointLimit, Skeleton
+from arm_ik_service.body.profile import GripOffset, Profile
+from arm_ik_service.wire.messages import VERSION, JointLimit, Pose, Skeleton
 
 
 @lru_cache(maxsize=64)
@@ -19,6 +19,10 @@ def _joint_limits() -> tuple[JointLimit, ...]:
     return tuple(
         JointLimit(name, *np.asarray(limits, float).tolist()) for name, limits in zip(ANGLES, ranges, strict=True)
     )
+
+
+def _pose(offset: GripOffset) -> Pose:
+    return Pose(offset.position_m, offset.orientation_xyzw)
 
 
 def skeleton_of(avatar: str, profile: Profile) -> Skeleton:
@@ -34,4 +38,6 @@ def skeleton_of(avatar: str, profile: Profile) -> Skeleton:
         hand_m=body.hand,
         joint_limits=_joint_limits(),
         limit_names=LIMITS,
+        left_wrist_from_grip=_pose(profile.grip.left),
+        right_wrist_from_grip=_pose(profile.grip.right),
     )

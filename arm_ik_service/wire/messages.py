@@ -149,6 +149,8 @@ class Skeleton(Struct, frozen=True):
     hand_m: float
     joint_limits: tuple[JointLimit, ...]
     limit_names: tuple[str, ...]  # every name that can stand in ArmState.limits
+    left_wrist_from_grip: Pose = Pose((0.0, -0.02, -0.075), (0.5, -0.5, -0.5, 0.5))  # OpenXR's grip in its wrist frame
+    right_wrist_from_grip: Pose = Pose((0.0, -0.02, -0.075), (0.5, 0.5, 0.5, 0.5))
 
 
 class AvatarHealth(Struct, frozen=True):
