@@ -25,7 +25,8 @@ ROOMS: dict[str, set[str]] = {
     "output": {*FOUNDATION, "geometry", "wire", "arm", "ik"},
     "skeleton": {*FOUNDATION, "wire", "arm", "body"},
     "avatar": {*FOUNDATION, "geometry", "settings", "wire", "tracking", "body", "arm", "ik", "output"},
-    "io": {*FOUNDATION, "geometry", "settings", "wire"},
+    "skin": {*FOUNDATION, "geometry", "wire"},
+    "io": {*FOUNDATION, "geometry", "settings", "wire", "skin"},
     "exports": {*FOUNDATION, "geometry", "wire", "body"},
     "bridges": {*FOUNDATION, "geometry", "wire", "body", "io"},
 }
@@ -41,6 +42,7 @@ OWNERS: dict[str, str | tuple[str, ...]] = {
     "rosbags": "exports.ros2",
     "foxglove": ("exports.foxglove_messages", "exports.mcap_files"),
     "pyarrow": "exports.table",
+    "pygltflib": "skin.gltf",
     "typer": "cli",
     "rich": "cli",
     "numba": ("compiled", "ik.clock"),  # the clock of a solver's time limit is an LLVM intrinsic

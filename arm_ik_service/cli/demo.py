@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from arm_ik_service.cli.options import say, stopped_by_signals
+from arm_ik_service.cli.options import AvatarFile, SkinningChoice, say, skin_options, stopped_by_signals
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -23,6 +23,8 @@ def demo(
         Path | None, typer.Option("--save", metavar="FILE", help="Write the view to this .rrd, display or not.")
     ] = None,
     no_view: Annotated[bool, typer.Option("--no-view", help="Without a picture: the table only.")] = False,
+    avatar: AvatarFile = None,
+    skinning: SkinningChoice = None,
 ) -> None:
     """Play a recording through a service and watch both arms move, all of it on this machine.
 
@@ -43,6 +45,10 @@ def demo(
     if save is None and not no_view and not has_display():
         save = Path(f"arm-ik-demo-{path.stem}.rrd")
     view = [] if no_view else (["--save", str(save)] if save else ["--spawn"])
+    if view:
+        skin_options(avatar, skinning)  # one that cannot be used is refused before anything starts
+        view += ["--avatar", str(avatar)] if avatar is not None else []
+        view += ["--skinning", skinning] if skinning is not None else []
     stopped = Event()
     console = Console(stderr=True)
     say(f"{path.stem}: replay -> Zenoh -> service -> Zenoh -> {'nobody' if no_view else save or 'Rerun'}")

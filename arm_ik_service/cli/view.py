@@ -7,7 +7,18 @@ from typing import Annotated
 
 import typer
 
-from arm_ik_service.cli.options import Connect, Listen, Scouting, ZenohConfig, bus_options, say, stopped_by_signals
+from arm_ik_service.cli.options import (
+    AvatarFile,
+    Connect,
+    Listen,
+    Scouting,
+    SkinningChoice,
+    ZenohConfig,
+    bus_options,
+    say,
+    skin_options,
+    stopped_by_signals,
+)
 
 
 def view(
@@ -20,6 +31,8 @@ def view(
     duration_s: Annotated[
         float | None, typer.Option("--duration", metavar="SECONDS", min=0.1, help="Stop after so long.")
     ] = None,
+    avatar: AvatarFile = None,
+    skinning: SkinningChoice = None,
     prefix: Annotated[str, typer.Option(help="Key prefix, as in the service's settings.")] = "",
     connect: Connect = None,
     listen: Listen = None,
@@ -45,8 +58,9 @@ def view(
         sinks.append(ConnectTo(connect_rerun))
     if spawn or not sinks:
         sinks.append(Spawn())
+    skin = skin_options(avatar, skinning)
     with open_client(bus_options(connect, listen, scouting, zenoh_config), waiting=say) as bus:
-        viewer = Viewer(bus, sinks, Keys(prefix))
+        viewer = Viewer(bus, sinks, Keys(prefix), skin)
         for sink in sinks:
             if isinstance(sink, Web):
                 say(f"view: open {sink.address} in a browser")

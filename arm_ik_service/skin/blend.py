@@ -37,9 +37,7 @@ def skin(
 
 
 @compiled
-def linear_blend(
-    vertices: Any, normals: Any, bones: Any, weights: Any, motions: Any, moved: Any, turned: Any
-) -> None:
+def linear_blend(vertices: Any, normals: Any, bones: Any, weights: Any, motions: Any, moved: Any, turned: Any) -> None:
     """Fill `moved` (V,3) and `turned` (V,3), unit. Displacements are averaged, so that no motion is exactly none."""
     # rows of (rotation - 1 | translation), 12 a bone
     maps = np.empty((len(motions), 12))
@@ -75,7 +73,7 @@ def linear_blend(
 def dual_quaternion_blend(
     vertices: Any, normals: Any, bones: Any, weights: Any, motions: Any, moved: Any, turned: Any
 ) -> None:
-    """Fill `moved` (V,3) and `turned` (V,3). Quaternions are averaged on the side of the bone with the largest weight."""
+    """Fill `moved` (V,3) and `turned` (V,3). Of q and -q the one nearer to the first bone's is averaged."""
     duals = np.empty((len(motions), 8))
     for b in range(len(motions)):
         tx, ty, tz, x, y, z, w = motions[b]

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -77,7 +78,7 @@ def character_of(mesh: SkinnedMesh, roles: Mapping[str, int]) -> Character:
 def _parent(part: str) -> int:
     above = {"hips": "chest", "chest": "", "neck": "chest", "head": "neck"}
     for side in SIDES:
-        above |= {side + b: side + a for a, b in zip(ARM_PARTS[:-1], ARM_PARTS[1:], strict=True)}
+        above |= {side + b: side + a for a, b in pairwise(ARM_PARTS)}
         above[f"{side}Shoulder"] = "chest"
     return PARTS.index(above[part]) if above[part] else -1
 
@@ -97,7 +98,7 @@ def _to_chest_frame(points: Floats, joints: Floats, roles: Mapping[str, int]) ->
 
 
 def _ancestors(parents: Sequence[int], bone: int) -> list[int]:
-    above = []
+    above: list[int] = []
     while (bone := parents[bone]) >= 0 and len(above) < len(parents):
         above.append(bone)
     return above
@@ -130,7 +131,9 @@ def _measure(side: Side, joints: Floats, roles: Mapping[str, int], mesh: Skinned
             raise SkinError(f"its {side} {name} has no length: are joints missing or all in one place?")
     y = batch.normalized(shoulder - elbow)
     along = batch.normalized(wrist - elbow)
-    bend = along + (along @ -y) * y  # the part of the forearm's direction across the upper arm: to the front of the hinge
+    bend = (
+        along + (along @ -y) * y
+    )  # the part of the forearm's direction across the upper arm: to the front of the hinge
     anterior = bend if np.linalg.norm(bend) > BENT else FORWARD - (FORWARD @ y) * y
     upper_arm = _frame(x=anterior, y=y)
     hand = _hand_frame(side, joints, roles, mesh, wrist)

@@ -1,7 +1,7 @@
 """A character made as large as a person: its joints come to lie where the published ones will be.
 
-Once, before anything moves: all of it is scaled, a whole body by its stature, arms alone by their length; then shoulders
-are set apart, and upper arms and forearms stretched, each along itself. Afterwards every bone only ever moves rigidly.
+Once, before anything moves: all of it is scaled, a whole body by its stature, arms alone by their length; then the
+shoulders are set apart, and upper arms and forearms stretched, each along itself. Afterwards bones move rigidly.
 """
 
 from __future__ import annotations

@@ -69,7 +69,9 @@ class _Reader:
         if compressed:
             raise SkinError(f"it is compressed with {', '.join(sorted(compressed))}: export it without compression")
         if not self.document.skins:
-            raise SkinError("no skin in it, so no vertex is bound to a bone: export the mesh together with its armature")
+            raise SkinError(
+                "no skin in it, so no vertex is bound to a bone: export the mesh together with its armature"
+            )
         parents = [-1] * len(nodes)
         for index, node in enumerate(nodes):
             for child in node.children or ():
@@ -106,9 +108,7 @@ class _Reader:
         )
         return mesh, _humanoid_map(self.document.extensions or {})
 
-    def _parts(
-        self, index: int, node: Any, poses: Floats, joints: set[int], parents: list[int]
-    ) -> list[_Part]:
+    def _parts(self, index: int, node: Any, poses: Floats, joints: set[int], parents: list[int]) -> list[_Part]:
         primitives = self.document.meshes[node.mesh].primitives
         if node.skin is not None:
             return [self._skinned(primitive, self.document.skins[node.skin], poses) for primitive in primitives]
@@ -204,7 +204,9 @@ class _Reader:
         start = (view.byteOffset or 0) + offset
         raw = self._buffer(view.buffer)
         if count and start + (count - 1) * stride + row > len(raw):
-            raise SkinError(f"the file ends early: {len(raw)} bytes where {start + (count - 1) * stride + row} are needed")
+            raise SkinError(
+                f"the file ends early: {len(raw)} bytes where {start + (count - 1) * stride + row} are needed"
+            )
         return np.ndarray((count, width), dtype, raw, start, (stride, dtype.itemsize))
 
     def _buffer(self, index: int) -> bytes:
@@ -258,7 +260,7 @@ def _humanoid_map(extensions: dict[str, Any]) -> dict[str, int]:
 
 
 def write_glb(mesh: SkinnedMesh, path: Path) -> None:
-    """Write a mesh with its bones as a GLB that any glTF program opens. At most four bones a vertex. Raises SkinError."""
+    """Write a mesh with its bones as a GLB, at most four bones a vertex. Raises SkinError."""
     if mesh.bones.shape[1] > 4:
         raise SkinError(f"{mesh.bones.shape[1]} bones on a vertex: a GLB of ours has room for 4")
     chunks: list[bytes] = []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -60,7 +61,7 @@ def pack_weights(bones: npt.ArrayLike, weights: npt.ArrayLike, bone_count: int) 
     return np.ascontiguousarray(b[:, :used]), np.ascontiguousarray(w[:, :used])
 
 
-def _refuse(broken: npt.NDArray[np.bool_], what: str) -> None:
+def _refuse(broken: Any, what: str) -> None:
     if broken.any():
         raise SkinError(f"vertex {int(np.argmax(broken))} has {what} ({int(broken.sum())} of {len(broken)} vertices)")
 

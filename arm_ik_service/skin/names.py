@@ -62,7 +62,7 @@ def role_of(name: str) -> str | None:
     """Return the role that a bone's name tells, if it does."""
     words = [word.lower() for word in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+", name)]
     side = ""
-    rest = []
+    rest: list[str] = []
     for word in words:
         if word in _SIDES and not side:
             side = _SIDES[word]

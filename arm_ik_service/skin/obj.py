@@ -11,6 +11,7 @@ need not sum to 1. Names are understood as those of other avatars are (`names.py
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 
 import msgspec
@@ -58,7 +59,9 @@ def read_obj(path: Path) -> tuple[SkinnedMesh, dict[str, int]]:
     for name, pairs in file.weights.items():
         for vertex, weight in pairs:
             if not 0 <= vertex < len(vertices):
-                raise SkinError(f"{beside}: {name} has a weight for vertex {vertex}, but {path.name} has {len(vertices)}")
+                raise SkinError(
+                    f"{beside}: {name} has a weight for vertex {vertex}, but {path.name} has {len(vertices)}"
+                )
             if used[vertex] == MOST_INFLUENCES:
                 raise SkinError(f"{beside}: vertex {vertex} is on more than {MOST_INFLUENCES} bones")
             bones[vertex, used[vertex]], weights[vertex, used[vertex]] = places[name], weight
@@ -98,7 +101,7 @@ def _read_surface(path: Path) -> tuple[np.ndarray, np.ndarray]:
             elif words[:1] == ["f"]:
                 corners = [int(word.split("/")[0]) for word in words[1:]]
                 corners = [corner - 1 if corner > 0 else len(vertices) + corner for corner in corners]
-                triangles += [(corners[0], b, c) for b, c in zip(corners[1:-1], corners[2:], strict=True)]
+                triangles += [(corners[0], b, c) for b, c in pairwise(corners[1:])]
         except (ValueError, IndexError) as error:
             raise SkinError(f"{path}: line {number} is not OBJ: {line[:60]!r}") from error
     faces = np.array(triangles, np.int64).reshape(-1, 3)

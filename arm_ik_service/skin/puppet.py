@@ -46,7 +46,7 @@ class Puppet:
         fitted = fit(character, measures)
         self.mesh: SkinnedMesh = fitted.mesh
         self.skinning: Skinning = skinning
-        self._arms = fitted.arms
+        self.arms = fitted.arms  # at rest
         self._has = fitted.has
         self._segments: dict[tuple[Side, str], TwistSegments] = {}
         for side, arm in fitted.arms.items():
@@ -72,7 +72,7 @@ class Puppet:
         return motions
 
     def _joint(self, part: str) -> Floats:
-        return self.mesh.joints[PARTS.index(part)]
+        return np.asarray(self.mesh.joints[PARTS.index(part)])
 
     def _turn_head(self, motions: Floats, chest: Floats, head: Floats) -> None:
         carrier = chest
@@ -87,7 +87,7 @@ class Puppet:
             )
 
     def _move_arm(self, motions: Floats, side: Side, chest: Floats, poses: Mapping[str, Floats]) -> None:
-        arm = self._arms[side]
+        arm = self.arms[side]
         upper, fore, hand = (poses[f"{side}/{name}"] for name in ("upper_arm", "forearm", "hand"))
         girdle = chest[:, 3:]
         if arm.clavicle is not None:

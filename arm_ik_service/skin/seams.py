@@ -33,7 +33,9 @@ def joints_in_mesh(mesh: SkinnedMesh, roles: Mapping[str, int]) -> tuple[Floats,
         if outside:
             offset = np.mean(offsets, axis=0)
             joints[_below(mesh, roles[f"{side}UpperArm"])] += offset
-            notes.append(f"the bones of its {side} arm lie {100.0 * np.linalg.norm(offset):.1f} cm beside it: moved into it")
+            notes.append(
+                f"the bones of its {side} arm lie {100.0 * np.linalg.norm(offset):.1f} cm beside it: moved into it"
+            )
     return joints, notes
 
 

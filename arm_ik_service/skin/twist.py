@@ -32,8 +32,7 @@ def split(mesh: SkinnedMesh, bone: int, end: Floats, segments: int = SEGMENTS) -
     """
     count = len(mesh.names)
     start = mesh.joints[bone]
-    axis = (end - start) / np.sum((end - start) ** 2)
-    place = np.clip((mesh.vertices - start) @ axis, 0.0, 1.0) * (segments - 1)
+    place = np.clip(along(mesh.vertices, start, end), 0.0, 1.0) * (segments - 1)
     below = np.minimum(place.astype(np.int64), max(segments - 2, 0))
     upper_share = place - below if segments > 1 else np.ones(len(place))
     bones = np.array([*range(count, count + segments - 1), bone])
@@ -56,6 +55,11 @@ def split(mesh: SkinnedMesh, bone: int, end: Floats, segments: int = SEGMENTS) -
         joints=np.concatenate([mesh.joints, np.repeat(start[None], added, axis=0)]),
     )
     return mesh, TwistSegments(bones, np.linspace(0.0, 1.0, segments) if segments > 1 else np.ones(1))
+
+
+def along(points: Floats, start: Floats, end: Floats) -> Floats:
+    """How far along the line from `start` (0) to `end` (1) points (...,3) lie."""
+    return np.asarray((points - start) @ (end - start) / np.sum((end - start) ** 2))
 
 
 def share_twist(parent: Floats, child: Floats, axis: Floats, shares: Floats) -> Floats:

@@ -5,11 +5,13 @@ LiveView              the same behind a thread: never waits, drops the oldest
 write_recording       a solved session as an .rrd
 write_picture         a moment of an .rrd as a .png, without a display
 Save Spawn Connect Web   where a view can go
+Skin                  a skinned character to draw people as, instead of solids
 """
 
 from arm_ik_service.io.rerun_view.live import LiveView
 from arm_ik_service.io.rerun_view.picture import write_picture
 from arm_ik_service.io.rerun_view.sinks import Connect, Save, Sink, Spawn, Web, has_display
+from arm_ik_service.io.rerun_view.skinned import Skin
 from arm_ik_service.io.rerun_view.view import OPENXR_GRIP, RerunView, write_recording
 
 __all__ = [
@@ -19,6 +21,7 @@ __all__ = [
     "RerunView",
     "Save",
     "Sink",
+    "Skin",
     "Spawn",
     "Web",
     "has_display",

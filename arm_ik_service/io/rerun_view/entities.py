@@ -6,17 +6,16 @@ import math
 from collections.abc import Iterable, Mapping
 
 import numpy as np
-import numpy.typing as npt
 import rerun as rr
 
 from arm_ik_service.geometry import batch
 from arm_ik_service.io.rerun_view import figure
 from arm_ik_service.io.rerun_view.palette import LATENCY_COLOURS, LIMIT, NAME, RESIDUAL, SIDE_COLOURS, STATE_COLOURS
 from arm_ik_service.io.rerun_view.rows import ANGLES, LATENCIES, PLACES, STATES, Floats, Rows
+from arm_ik_service.io.rerun_view.skinned import Skin, SkinSender
 from arm_ik_service.io.rerun_view.solids import Solid
+from arm_ik_service.io.rerun_view.timelines import Integers, time_columns
 from arm_ik_service.wire.messages import SIDES, VERSION, ArmsState, Pose, Side, Skeleton, TrackingState
-
-Integers = npt.NDArray[np.int64]
 
 NECK_ROOT = (0.0, 0.065, 0.004)  # top of the torso in the chest frame [m]
 GIRDLE_ROOT = (0.035, 0.014, 0.0)  # of the right side, in the chest frame [m]
@@ -122,7 +121,10 @@ def between_y(direction: Floats) -> Floats:
 class Sender:
     """Sends the gathered rows of one avatar as columns."""
 
-    def __init__(self, recording: rr.RecordingStream, root: str) -> None:
+    def __init__(self, recording: rr.RecordingStream, root: str, skin: Skin | None = None) -> None:
+        self._skin = SkinSender(recording, root, skin) if skin is not None else None
+        self._replaced = skin.replaces if skin is not None else set()
+        self._tints_hands = skin is None or skin.arms_only
         self._limits_deg: Floats = np.full((len(ANGLES), 2), np.nan)
         self._wrist_from_grip: dict[Side, Floats] = {}
         self._recording = recording
@@ -133,7 +135,10 @@ class Sender:
     def describe(self, skeleton: Skeleton, wrist_from_grip: Mapping[Side, Pose]) -> None:
         """Log the solids, static; from now on the plots have these limits, the residual line starts at these grips."""
         for name, solid in _solids(skeleton).items():
-            self._recording.log(f"{self._root}/{name}", _mesh(solid), static=True)
+            if name not in self._replaced:
+                self._recording.log(f"{self._root}/{name}", _mesh(solid), static=True)
+        if self._skin is not None:
+            self._skin.describe(skeleton)
         limits = {limit.name: (limit.lower, limit.upper) for limit in skeleton.joint_limits}
         self._limits_deg = np.rad2deg([limits.get(name, (np.nan, np.nan)) for name in ANGLES])
         self._wrist_from_grip = {
@@ -146,8 +151,10 @@ class Sender:
             return
         values = np.array(rows.values)
         frames, times = np.array(rows.frames, np.int64), np.array(rows.times_ns, np.int64)
-        self._time = _time(frames, times)
+        self._time = time_columns(frames, times)
         self._send_trunk(values)
+        if self._skin is not None:
+            self._skin.send(values, frames, times)
         for k, side in enumerate(SIDES):
             self._send_side(side, values)
             self._send_state(side, [pair[k] for pair in rows.states], frames, times)
@@ -206,10 +213,11 @@ class Sender:
         self._states[side] = states[-1]
         if not changed:
             return
-        time = _time(frames[changed], times[changed])
+        time = time_columns(frames[changed], times[changed])
         new = [states[k] for k in changed]
         colours = np.array([(*STATE_COLOURS[state], 255) for state in new], np.uint8)
-        self._recording.send_columns(f"{self._root}/{side}/hand", time, rr.Mesh3D.columns(albedo_factor=colours))
+        if self._tints_hands:
+            self._recording.send_columns(f"{self._root}/{side}/hand", time, rr.Mesh3D.columns(albedo_factor=colours))
         self._recording.send_columns(f"{self._root}/plots/tracking/{side}", time, rr.StateChange.columns(state=new))
 
     def _scalars(self, entity: str, series: Floats) -> None:
@@ -227,10 +235,3 @@ class Sender:
         residual = [values[:, PLACES[f"{side}/residual_mm"]] for side in SIDES]
         self._scalars("residual_mm", np.concatenate(residual, axis=1))
         self._scalars("latency_ms", values[:, PLACES["latency_ms"]])
-
-
-def _time(frames: Integers, times_ns: Integers) -> list[rr.TimeColumn]:
-    return [
-        rr.TimeColumn("frame", sequence=frames),
-        rr.TimeColumn("sample_time", duration=times_ns.astype("timedelta64[ns]")),
-    ]

@@ -17,6 +17,7 @@ from arm_ik_service.io.rerun_view.blueprint import blueprint_of
 from arm_ik_service.io.rerun_view.entities import Sender, entity_of, log_name, log_styles, skeleton_of
 from arm_ik_service.io.rerun_view.rows import Rows
 from arm_ik_service.io.rerun_view.sinks import Save, Sink, attach, first_line
+from arm_ik_service.io.rerun_view.skinned import Skin
 from arm_ik_service.wire.messages import ArmsState, ControllerFrame, Pose, Side, Skeleton
 
 APPLICATION = "arm_ik"
@@ -51,8 +52,10 @@ class RerunView:
     Timelines: `frame` (seq) and `sample_time` (duration). Nothing is sent before `flush`, `close`, or BATCH_ROWS rows.
     """
 
-    def __init__(self, *sinks: Sink, name: str = "", spacing_m: float = 0.0) -> None:
+    def __init__(self, *sinks: Sink, name: str = "", spacing_m: float = 0.0, skin: Skin | None = None) -> None:
         """Open the sinks; `name` titles the recording, `spacing_m` sets avatars apart that share one origin.
+
+        With a `skin` everybody is drawn as that character; without, as solids.
 
         Raises ViewError.
         """
@@ -60,6 +63,7 @@ class RerunView:
         attach(self._recording, sinks)
         self.watched = not all(isinstance(sink, Save) for sink in sinks)  # somebody looks on
         self._spacing_m = spacing_m
+        self._skin = skin
         self._people: dict[str, _Person] = {}
         self._described: dict[str, tuple[Skeleton, Mapping[Side, Pose]]] = {}
         if name:
@@ -127,7 +131,7 @@ class RerunView:
     def _meet(self, arms: ArmsState) -> _Person:
         """Log everything static of an avatar that is seen for the first time, and lay the viewer out anew."""
         root = entity_of(arms.avatar)
-        person = _Person(root, Sender(self._recording, root), arms.chest)
+        person = _Person(root, Sender(self._recording, root, self._skin), arms.chest)
         offset = self._spacing_m * len(self._people)
         if offset:
             self._recording.log(root, rr.Transform3D(translation=(offset, 0.0, 0.0)), static=True)
@@ -158,10 +162,11 @@ def write_recording(
     *,
     wrist_from_grip: Mapping[Side, Pose] = OPENXR_GRIP,
     name: str = "",
+    skin: Skin | None = None,
 ) -> int:
     """Write a solved session to an .rrd, in constant memory; returns the number of frames. Raises ViewError."""
     count = 0
-    with RerunView(Save(path), name=name) as view:
+    with RerunView(Save(path), name=name, skin=skin) as view:
         if skeleton is not None:
             view.describe(skeleton, wrist_from_grip)
         for frame, arms in answers:

@@ -10,12 +10,12 @@ import numpy as np
 from arm_ik_service.geometry import batch
 from arm_ik_service.skin.blend import skin
 from arm_ik_service.skin.builtin.polygonise import gradient, open_edge, rings, surface_net, zip_up
-from arm_ik_service.skin.builtin.solid import FOREARM_M, UPPER_ARM_M, WRIST_Y, distance, limb
+from arm_ik_service.skin.builtin.solid import UPPER_ARM_M, WRIST_Y, distance, limb
 from arm_ik_service.skin.mesh import SKIN_COLOUR, Floats, Integers, SkinnedMesh, pack_weights, vertex_normals
 from arm_ik_service.skin.twist import split
 
-AROUND = 32  # vertices of a ring: 8 mm apart at the forearm
-RING_M = 0.008  # from ring to ring
+AROUND = 24  # vertices of a ring: 1 cm apart at the forearm
+RING_M = 0.012  # from ring to ring
 WIDEST_M = 0.08  # more than any half width of the limb
 NET_M = 0.0033  # grid of the hand: finer than the gaps between fingers
 SEAM_M = 0.012  # from the last ring to the hand's rim, above the wrist joint

@@ -1,8 +1,9 @@
-"""From a solid to triangles: rings around a limb, naive surface nets (Gibson 1998) for a hand, and a seam of the two."""
+"""From a solid to triangles: rings around a limb, naive surface nets (Gibson 1998) for a hand, a seam between."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -42,7 +43,7 @@ def surface_net(distance: Distance, lower: Floats, upper: Floats, step: float) -
     corners = [np.array([i, j, k]) for i in (0, 1) for j in (0, 1) for k in (0, 1)]
     cells = tuple(n - 1 for n in inside.shape)
 
-    def corner(array: npt.NDArray[np.generic], at: Integers) -> npt.NDArray[np.generic]:
+    def corner(array: npt.NDArray[Any], at: Integers) -> npt.NDArray[Any]:
         return array[tuple(slice(o, o + n) for o, n in zip(at, cells, strict=True))]
 
     count = sum(corner(inside, at).astype(np.int64) for at in corners)
@@ -93,7 +94,7 @@ def _onto(distance: Distance, points: Floats, step: float) -> Floats:
         points = points - np.clip(distance(points), -0.3 * step, 0.3 * step)[:, None] * normal
     moved = points - start
     length = np.linalg.norm(moved, axis=1, keepdims=True)
-    return start + moved * np.minimum(1.0, 0.6 * step / np.maximum(length, 1e-12))
+    return np.asarray(start + moved * np.minimum(1.0, 0.6 * step / np.maximum(length, 1e-12)))
 
 
 def gradient(distance: Distance, points: Floats, step: float = 2e-4) -> Floats:
@@ -118,7 +119,7 @@ def zip_up(vertices: Floats, upper: Integers, lower: Integers) -> Integers:
 
     def angles(rim: Integers) -> Floats:
         off = vertices[rim] - middle
-        return np.arctan2(off[:, 2], off[:, 0])
+        return np.asarray(np.arctan2(off[:, 2], off[:, 0]))
 
     nearest = np.argmin(np.abs(np.exp(1j * angles(lower)) - np.exp(1j * angles(upper)[0])))
     lower = np.roll(lower, -nearest)

@@ -65,8 +65,12 @@ def distance(points: Floats) -> Floats:
     forearm = np.maximum((across - 1.0) * np.minimum(half_x, half_z), _SECTIONS[-1, 0] - points[..., 1])
     p = points - np.array([0.0, WRIST_Y, 0.0])
     palm = _rounded_box(_arched(p) - [-0.001, -0.052, 0.0005], np.array([0.0125, 0.044, 0.040]), 0.0115)
-    palm = _union(palm, _cone(p, (0.010, -0.022, 0.014), (0.014, -0.058, 0.026), 0.0155, 0.013), 0.018)  # ball of the thumb
-    palm = _union(palm, _cone(p, (0.008, -0.026, -0.022), (0.007, -0.066, -0.027), 0.0145, 0.012), 0.016)  # edge of the hand
+    palm = _union(
+        palm, _cone(p, (0.010, -0.022, 0.014), (0.014, -0.058, 0.026), 0.0155, 0.013), 0.018
+    )  # ball of the thumb
+    palm = _union(
+        palm, _cone(p, (0.008, -0.026, -0.022), (0.007, -0.066, -0.027), 0.0145, 0.012), 0.016
+    )  # edge of the hand
     hand = _union(forearm, palm, 0.022)
     thumb = _chain(p, _THUMB, _THUMB_RADII, 0.006)
     hand = _union(hand, thumb, 0.010)
@@ -94,7 +98,7 @@ def _arched(p: Floats) -> Floats:
 
 
 def _chain(p: Floats, joints: tuple[tuple[float, float, float], ...], radii: tuple[float, ...], blend: float) -> Floats:
-    parts = [_cone(p, *joints[k : k + 2], *radii[k : k + 2]) for k in range(len(joints) - 1)]
+    parts = [_cone(p, joints[k], joints[k + 1], radii[k], radii[k + 1]) for k in range(len(joints) - 1)]
     whole = parts[0]
     for part in parts[1:]:
         whole = _union(whole, part, blend)
