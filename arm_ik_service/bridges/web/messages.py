@@ -28,9 +28,10 @@ from arm_ik_service.wire.messages import (
 PROTOCOL = 1
 MAX_MESSAGE_BYTES = 4096  # the largest honest message, a frame, is about 700 bytes
 
-# WebSocket close codes: two of RFC 6455, the rest from its private range
+# WebSocket close codes: those of RFC 6455 and IANA, the rest from the private range
 MALFORMED = 1008
 TOO_LARGE = 1009
+RESTART = 1012
 WRONG_CODE = 4401
 TAKEN_OVER = 4409
 TOO_MANY_TRIES = 4429

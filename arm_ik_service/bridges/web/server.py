@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import socket
 import time
 from dataclasses import dataclass, field
 from importlib.resources import files
@@ -25,6 +26,7 @@ log = logging.getLogger("arm_ik.bridge.web")
 
 HELLO_WITHIN_S = 5.0
 HEARTBEAT_S = 4.0  # a headset that was taken off the network is noticed after one and a half of these
+CLOSE_WITHIN_S = 1.0  # for the other side to say goodbye
 REPORT_PERIOD_S = 1.0
 UNREAD_BYTES = 8192  # in the socket's own buffer, about three answers: beyond that the newest waits in its seat
 
@@ -48,7 +50,7 @@ class Tally:
     refused: dict[str, int] = field(default_factory=dict)  # cause -> count
 
 
-class _DroppedError(Exception):
+class _DropError(Exception):
     """Close this socket with a code and a reason, and count the cause."""
 
     def __init__(self, cause: str, code: int, detail: str) -> None:
@@ -73,6 +75,7 @@ class WebBridge:
         self._origins: set[str] = set()
         self._pairing = Pairing(code, papers.secret)
         self._seats: dict[str, tuple[Seat, web.WebSocketResponse]] = {}
+        self._ending: set[asyncio.Task[bool]] = set()
         self._details: dict[str, tuple[int, str]] = {}
         self._page = _page_files()
 
@@ -83,13 +86,13 @@ class WebBridge:
         app.router.add_get("/{name:.*}", self._file)
         runner = web.AppRunner(app, access_log=None, shutdown_timeout=1.0)
         await runner.setup()
+        port = self._port or _free_port()
         try:
             try:
-                site = web.TCPSite(runner, host, self._port, ssl_context=self._papers.tls, reuse_address=True)
+                site = web.TCPSite(runner, host, port, ssl_context=self._papers.tls, reuse_address=True)
                 await site.start()
             except OSError as error:
-                raise BridgeError(f"cannot listen on port {self._port}: {error.strerror}; try --port") from error
-            port = int(runner.addresses[0][1])
+                raise BridgeError(f"cannot listen on port {port}: {error.strerror}; try --port") from error
             self._origins = {url(name, port) for name in self._names}
             ready(port)
             while not stopped.is_set():
@@ -99,8 +102,9 @@ class WebBridge:
                 except TimeoutError:
                     continue
         finally:
-            for _, socket in list(self._seats.values()):
-                await socket.close(code=1012, message=b"the bridge is stopped")
+            for _, websocket in list(self._seats.values()):
+                self._end_soon(websocket, messages.RESTART, b"the bridge is stopped")
+            await asyncio.gather(*self._ending, return_exceptions=True)
             await runner.cleanup()
             self._report()
 
@@ -117,32 +121,36 @@ class WebBridge:
         if origin not in self._origins:
             self._refuse("origin", f"{request.remote}: a page from {origin[:100]}")
             return web.Response(status=403, text="this page may not be used from another origin\n")
-        socket = web.WebSocketResponse(
-            max_msg_size=messages.MAX_MESSAGE_BYTES, compress=False, heartbeat=HEARTBEAT_S, writer_limit=UNREAD_BYTES
+        websocket = web.WebSocketResponse(
+            max_msg_size=messages.MAX_MESSAGE_BYTES,
+            compress=False,
+            heartbeat=HEARTBEAT_S,
+            timeout=CLOSE_WITHIN_S,
+            writer_limit=UNREAD_BYTES,
         )
-        await socket.prepare(request)
+        await websocket.prepare(request)
         who = str(request.remote)
         try:
-            avatar = await self._pair(socket, who)
+            avatar = await self._pair(websocket, who)
             who = avatar
-            await self._serve(socket, avatar)
-        except _DroppedError as drop:
+            await self._serve(websocket, avatar)
+        except _DropError as drop:
             self._refuse(drop.cause, f"{who}: {drop}")
-            await socket.close(code=drop.code, message=str(drop).encode()[:120])
-        return socket
+            await websocket.close(code=drop.code, message=str(drop).encode()[:120])
+        return websocket
 
-    async def _pair(self, socket: web.WebSocketResponse, address: str) -> str:
-        """Return the avatar id of a page that says who it is. Raises _DroppedError."""
+    async def _pair(self, websocket: web.WebSocketResponse, address: str) -> str:
+        """Return the avatar id of a page that says who it is. Raises _DropError."""
         try:
-            hello = await asyncio.wait_for(_receive(socket), HELLO_WITHIN_S)
+            hello = await asyncio.wait_for(_receive(websocket), HELLO_WITHIN_S)
         except TimeoutError:
-            raise _DroppedError("silent", messages.MALFORMED, "said nothing after connecting") from None
+            raise _DropError("silent", messages.MALFORMED, "said nothing after connecting") from None
         if hello is None:
-            raise _DroppedError("silent", messages.MALFORMED, "left without a word")
+            raise _DropError("silent", messages.MALFORMED, "left without a word")
         if not isinstance(hello, messages.Hello):
-            raise _DroppedError("malformed", messages.MALFORMED, "the first message has to be a hello")
+            raise _DropError("malformed", messages.MALFORMED, "the first message has to be a hello")
         if hello.protocol != messages.PROTOCOL:
-            raise _DroppedError(
+            raise _DropError(
                 "protocol", messages.MALFORMED, "page and bridge are of different versions: reload the page"
             )
         avatar = self._pairing.avatar_for_token(hello.token) if hello.token else None
@@ -150,31 +158,31 @@ class WebBridge:
             return avatar
         now_s = time.monotonic()
         if self._pairing.locked(address, now_s):
-            raise _DroppedError("locked", messages.TOO_MANY_TRIES, "too many wrong codes: wait a minute")
+            raise _DropError("locked", messages.TOO_MANY_TRIES, "too many wrong codes: wait a minute")
         avatar = self._pairing.avatar_for_code(hello.code or "", address, now_s)
         if avatar is None:
-            raise _DroppedError("code", messages.WRONG_CODE, "wrong code")
+            raise _DropError("code", messages.WRONG_CODE, "wrong code")
         return avatar
 
-    async def _serve(self, socket: web.WebSocketResponse, avatar: str) -> None:
-        """Carry frames in and arms out until the page leaves. Raises _DroppedError."""
+    async def _serve(self, websocket: web.WebSocketResponse, avatar: str) -> None:
+        """Carry frames in and arms out until the page leaves. Raises _DropError."""
         before = self._seats.pop(avatar, None)
         if before is not None:
-            await before[1].close(code=messages.TAKEN_OVER, message=b"this avatar was opened in another window")
+            self._end_soon(before[1], messages.TAKEN_OVER, b"this avatar was opened in another window")
         seat = Seat(self._bus, self._keys, avatar, self._encoding)
-        self._seats[avatar] = seat, socket
+        self._seats[avatar] = seat, websocket
         seat.reply(messages.Welcome(avatar, self._pairing.token(avatar)))
         log.info("%s: paired", avatar)
-        writer = asyncio.create_task(_write(seat, socket))
+        writer = asyncio.create_task(_write(seat, websocket))
         describing = asyncio.create_task(seat.describe())
         try:
-            while (message := await _receive(socket)) is not None:
+            while (message := await _receive(websocket)) is not None:
                 if isinstance(message, messages.Frame):
                     seat.publish(message)
                 elif isinstance(message, messages.Ping):
                     seat.reply(messages.Pong(message.page_ms, time.time_ns()))
                 else:
-                    raise _DroppedError("malformed", messages.MALFORMED, "a second hello")
+                    raise _DropError("malformed", messages.MALFORMED, "a second hello")
         finally:
             writer.cancel()
             describing.cancel()
@@ -185,6 +193,12 @@ class WebBridge:
             self.tally.published += seat.published
             self.tally.returned += seat.returned
             log.info("%s: left after %d frames", avatar, seat.published)
+
+    def _end_soon(self, websocket: web.WebSocketResponse, code: int, reason: bytes) -> None:
+        """Close a socket without waiting for it: its page may be gone, and the new one is here."""
+        task = asyncio.create_task(websocket.close(code=code, message=reason))
+        self._ending.add(task)
+        task.add_done_callback(self._ending.discard)
 
     def _refuse(self, cause: str, detail: str) -> None:
         self.tally.refused[cause] = self.tally.refused.get(cause, 0) + 1
@@ -202,31 +216,36 @@ class WebBridge:
         return f"published {self.tally.published} frames, returned {self.tally.returned} answers, refused: {refused}"
 
 
-async def _receive(socket: web.WebSocketResponse) -> messages.FromPage | None:
-    """Return the next message, or None at the end of the socket. Raises _DroppedError for what is no message of ours."""
-    received = await socket.receive()
+async def _receive(websocket: web.WebSocketResponse) -> messages.FromPage | None:
+    """Return the next message, or None at the end. Raises _DropError for what is no message of ours."""
+    received = await websocket.receive()
     if received.type is WSMsgType.BINARY:
         try:
             return messages.decode(received.data)
         except DecodeError as error:
-            raise _DroppedError("malformed", messages.MALFORMED, str(error)) from error
+            raise _DropError("malformed", messages.MALFORMED, str(error)) from error
     if received.type is WSMsgType.TEXT:
-        raise _DroppedError("malformed", messages.MALFORMED, "text instead of MessagePack")
-    if socket.close_code == messages.TOO_LARGE:
-        raise _DroppedError(
-            "too_large", messages.TOO_LARGE, f"a message of more than {messages.MAX_MESSAGE_BYTES} bytes"
-        )
+        raise _DropError("malformed", messages.MALFORMED, "text instead of MessagePack")
+    if received.type is WSMsgType.ERROR and getattr(received.data, "code", 0) == messages.TOO_LARGE:
+        raise _DropError("too_large", messages.TOO_LARGE, f"a message of more than {messages.MAX_MESSAGE_BYTES} bytes")
     return None
 
 
-async def _write(seat: Seat, socket: web.WebSocketResponse) -> None:
+async def _write(seat: Seat, websocket: web.WebSocketResponse) -> None:
     """Send what the seat has, as fast as the page takes it; a page that is gone ends the reader as well."""
     while True:
         message = await seat.next_message()
         try:
-            await socket.send_bytes(message)
+            await websocket.send_bytes(message)
         except (ConnectionError, RuntimeError):
             return
+
+
+def _free_port() -> int:
+    """Return a port that was free a moment ago: asking for port 0 would give IPv4 and IPv6 different ones."""
+    with socket.socket() as probe:
+        probe.bind(("", 0))
+        return int(probe.getsockname()[1])
 
 
 def _page_files() -> dict[str, tuple[bytes, str]]:
