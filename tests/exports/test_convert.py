@@ -1,0 +1,145 @@
+"""`arm-ik convert` to other people's files: the recorded answers, or solved ones where there are none."""
+
+from __future__ import annotations
+
+import tracemalloc
+from collections.abc import Iterator
+from pathlib import Path
+
+import bvhio
+import pyarrow.parquet
+import pytest
+from mcap.reader import make_reader
+from postures import HANGING, RAISED, frame_of, motion, person
+from typer.testing import CliRunner
+
+from arm_ik_service.cli import app
+from arm_ik_service.errors import SessionError, SettingsError
+from arm_ik_service.exports.dialects import McapDialect
+from arm_ik_service.io.recording import RecordingWriter
+from arm_ik_service.io.session import RecordedFrame, Session, open_session
+from arm_ik_service.programs.demo import bundled_session
+from arm_ik_service.programs.export_session import export_session
+from arm_ik_service.wire.messages import ArmsState
+
+
+def recorded(path: Path, states: list[ArmsState], *, answers: bool = True) -> Session:
+    with RecordingWriter(path) as writer:
+        for state in states:
+            writer.write_frame(state.avatar, frame_of(state), state.receive_time_ns)
+            if answers:
+                writer.write_arms(state.avatar, state, state.publish_time_ns)
+    return open_session(path)
+
+
+def test_recorded_answers_are_converted_as_they_are(tmp_path: Path) -> None:
+    states = motion(50)
+    session = recorded(tmp_path / "session.mcap", states)
+    assert export_session(session, tmp_path / "arms.parquet") == 50
+    table = pyarrow.parquet.read_table(tmp_path / "arms.parquet")
+    assert table["right_elbow_flexion_rad"].to_pylist() == [s.right.angles.elbow_flexion for s in states]
+    assert not (tmp_path / "arms.part.parquet").exists()
+
+
+def test_a_session_without_answers_is_solved(tmp_path: Path) -> None:
+    session = open_session(bundled_session("reach_and_grab"))
+    shown: list[int] = []
+    count = export_session(session, tmp_path / "arms.bvh", progress=shown.append)
+    assert count == sum(shown) == session.frame_count
+    root = bvhio.readAsBvh(str(tmp_path / "arms.bvh"), loadKeyFrames=False)
+    assert abs(root.FrameCount - count) <= 2
+
+
+@pytest.mark.parametrize("dialect", list(McapDialect))
+def test_every_mcap_dialect_is_a_whole_file_with_an_index(tmp_path: Path, dialect: McapDialect) -> None:
+    session = recorded(tmp_path / "session.mcap", motion(20))
+    export_session(session, tmp_path / "out.mcap", dialect=dialect)
+    with (tmp_path / "out.mcap").open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    assert summary.statistics is not None
+    assert summary.statistics.message_count >= 20
+    assert summary.chunk_indexes
+
+
+def test_the_mirror_is_in_the_file(tmp_path: Path) -> None:
+    session = recorded(tmp_path / "session.mcap", [person(HANGING, RAISED)])
+    export_session(session, tmp_path / "arms.parquet", mirror=True)
+    row = pyarrow.parquet.read_table(tmp_path / "arms.parquet").to_pylist()[0]
+    assert row["left_hand_y_m"] > 1.8
+    assert row["left_hand_x_m"] < -0.1
+
+
+def test_bvh_of_several_people_asks_which_one(tmp_path: Path) -> None:
+    session = recorded(tmp_path / "two.mcap", [person(avatar="ann"), person(HANGING, RAISED, avatar="bob")])
+    with pytest.raises(SessionError, match="ann, bob"):
+        export_session(session, tmp_path / "arms.bvh")
+    assert export_session(session, tmp_path / "arms.bvh", avatar="bob") == 1
+    assert export_session(session, tmp_path / "arms.csv") == 2
+
+
+def test_what_cannot_be_done_is_said_and_leaves_no_file(tmp_path: Path) -> None:
+    session = recorded(tmp_path / "session.mcap", [person()])
+    with pytest.raises(SettingsError, match="dialect"):
+        export_session(session, tmp_path / "arms.bvh", dialect=McapDialect.ROS2)
+    with pytest.raises(SettingsError, match="fps"):
+        export_session(session, tmp_path / "arms.csv", fps=30.0)
+    with pytest.raises(SessionError, match="nobody"):
+        export_session(session, tmp_path / "arms.csv", avatar="nobody")
+    with pytest.raises(SessionError, match="written"):
+        export_session(session, tmp_path / "nowhere" / "arms.bvh")
+    assert [path.name for path in tmp_path.iterdir()] == ["session.mcap"]
+
+
+def test_the_command_line_keeps_session_options_and_arm_options_apart(tmp_path: Path) -> None:
+    recorded(tmp_path / "session.mcap", motion(5))
+    run = CliRunner().invoke
+    session, npz, bvh = (str(tmp_path / name) for name in ("session.mcap", "again.npz", "arms.bvh"))
+    assert run(app, ["convert", session, npz]).exit_code == 0
+    assert run(app, ["convert", session, bvh, "--fps", "45"]).exit_code == 0
+    wrong = run(app, ["convert", session, npz, "--overwrite", "--mirror"])
+    assert isinstance(wrong.exception, SettingsError)
+    again = run(app, ["convert", session, bvh])
+    assert isinstance(again.exception, SessionError)
+    assert "--overwrite" in str(again.exception)
+
+
+class Looped:
+    """An endless session's answers: the same few states at ever later times."""
+
+    warnings: tuple[str, ...] = ()
+    metadata: dict[str, str | float | bool] = {}  # noqa: RUF012
+    avatars: tuple[str, ...] = ("ann",)
+    path = Path("looped.mcap")
+    duration_s = None
+
+    def __init__(self, count: int) -> None:
+        self.frame_count = count
+        self._states = motion(200)
+
+    def arms(self) -> Iterator[ArmsState]:
+        import msgspec
+
+        for k in range(self.frame_count):
+            yield msgspec.structs.replace(self._states[k % 200], seq=k, sample_time_ns=10**9 + k * 11_111_111)
+
+    def frames(self) -> Iterator[RecordedFrame]:
+        yield from ()
+
+    def calibration(self, avatar: str) -> bytes | None:
+        return None
+
+
+@pytest.mark.parametrize("suffix", ["bvh", "csv", "mcap"])
+def test_memory_does_not_grow_with_the_session(tmp_path: Path, suffix: str) -> None:
+    dialect = McapDialect.ROS2 if suffix == "mcap" else None
+    export_session(Looped(300), tmp_path / f"warm.{suffix}", dialect=dialect)
+    peaks = []
+    for count in (5_000, 10_000):
+        tracemalloc.start()
+        export_session(Looped(count), tmp_path / f"{count}.{suffix}", dialect=dialect)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    small, large = (tmp_path / f"{count}.{suffix}" for count in (5_000, 10_000))
+    assert large.stat().st_size - small.stat().st_size > 1_000_000 or suffix == "mcap"
+    assert peaks[1] < peaks[0] + 0.25 * (large.stat().st_size - small.stat().st_size) + 500_000
