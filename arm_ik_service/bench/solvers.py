@@ -19,7 +19,7 @@ from arm_ik_service.bench.arm_tasks import ArmTask
 from arm_ik_service.bench.contender import Contender, Tolerances, first_posture
 from arm_ik_service.bench.measures import ArmResult, Summary, evaluate, recorded, summarise
 
-CHUNK = 256  # frames between two looks at whether somebody wants to stop
+CHUNK = 64  # frames between two looks at whether somebody wants to stop
 RECORDED = "recorded"
 
 Progress = Callable[[str, int], None]

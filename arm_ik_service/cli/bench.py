@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -54,13 +54,16 @@ def solvers(
     from arm_ik_service.bench.arm_tasks import read_tasks
     from arm_ik_service.bench.contender import Tolerances
     from arm_ik_service.bench.solvers import compare
+    from arm_ik_service.cli.progress import frames_progress
 
     contenders, absent = _contenders(solver)
     tasks = [task for session in sessions for task in read_tasks(session, frames)]
     stopped = Event()
     total = len(contenders) * sum(len(task.targets) for task in tasks)
-    with stopped_by_signals(stopped.set), _progress(total) as progress:
-        comparison = compare(tasks, contenders, Tolerances(), progress=progress, stopped=stopped.is_set)
+    with stopped_by_signals(stopped.set), frames_progress("bench solvers", total) as advance:
+        comparison = compare(
+            tasks, contenders, Tolerances(), progress=lambda _, done: advance(done), stopped=stopped.is_set
+        )
     if comparison.interrupted:
         say(f"stopped: {len(comparison.tasks)} of {len(tasks)} arms were measured")
     if json_output:
@@ -109,20 +112,6 @@ def _contenders(wanted: list[str] | None) -> tuple[list[Contender], dict[str, st
     if not chosen:
         raise SettingsError("; ".join(f"{name} is {why}" for name, why in absent.items()))
     return chosen, absent
-
-
-def _progress(total: int) -> Any:
-    """The project's bar, with the contender under way in its title."""
-    from contextlib import contextmanager
-
-    from arm_ik_service.cli.progress import frames_progress
-
-    @contextmanager
-    def bar() -> Any:
-        with frames_progress("bench solvers", total) as advance:
-            yield lambda name, frames: advance(frames)
-
-    return bar()
 
 
 COLUMNS = (  # heading, field of Summary, format
