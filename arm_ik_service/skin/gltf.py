@@ -30,7 +30,9 @@ def read_gltf(path: Path) -> tuple[SkinnedMesh, dict[str, int]]:
     Raises SkinError.
     """
     try:
-        document = gltf.GLTF2().load(str(path))
+        with path.open("rb") as file:
+            binary = file.read(4) == b"glTF"  # a VRM is a GLB, whatever its name ends with
+        document = gltf.GLTF2().load_binary(str(path)) if binary else gltf.GLTF2().load_json(str(path))
     except OSError as error:
         raise SkinError(f"{path}: {error.strerror}") from error
     except Exception as error:  # pygltflib lets through whatever struct, json and dataclasses raise

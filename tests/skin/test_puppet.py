@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 from arm_poses import CHEST, MEASURES, configuration, poses
 
@@ -17,14 +18,14 @@ from arm_ik_service.skin.mesh import Floats, SkinnedMesh
 from arm_ik_service.skin.names import find_roles
 from arm_ik_service.skin.puppet import Puppet
 from arm_ik_service.skin.twist import along
-from arm_ik_service.wire.messages import SIDES
+from arm_ik_service.wire.messages import SIDES, Side
 
 REACHING = configuration(abduction=40.0, flexion=50.0, elbow=70.0, pronation=120.0, wrist=20.0)
 HANGING = configuration()
 
 
-def on_hand(mesh: SkinnedMesh, side: str) -> np.ndarray:
-    return (mesh.bones[:, 0] == PARTS.index(f"{side}Hand")) & (mesh.weights[:, 0] > 1.0 - 1e-12)
+def on_hand(mesh: SkinnedMesh, side: Side) -> npt.NDArray[np.bool_]:
+    return np.asarray((mesh.bones[:, 0] == PARTS.index(f"{side}Hand")) & (mesh.weights[:, 0] > 1.0 - 1e-12))
 
 
 def at_rest(puppet: Puppet) -> dict[str, Floats]:
@@ -89,7 +90,7 @@ def re_posed(mesh: SkinnedMesh, cfg: Floats) -> SkinnedMesh:
     roles = find_roles(mesh.names)
     joints = mesh.joints.copy()
     for name, bone in roles.items():
-        side = "left" if name.startswith("left") else "right"
+        side: Side = "left" if name.startswith("left") else "right"
         carrier = name if name in PARTS else f"{side}Hand"
         motion = motions[PARTS.index(carrier)]
         arm = puppet.arms[side]
