@@ -60,6 +60,20 @@ def _about(axis: int, angle_deg: float) -> Array:
     return batch.exp(np.eye(3)[axis] * np.radians(angle_deg))
 
 
+def _clavicle() -> Array:
+    root = HALF_WIDTH_M * np.array(STERNOCLAVICULAR)
+    bone = np.array([HALF_WIDTH_M, 0.0, 0.0]) - root
+    bone /= np.linalg.norm(bone)
+    anterior = np.cross([0.0, 1.0, 0.0], bone)
+    anterior /= np.linalg.norm(anterior)
+    return np.concatenate([root, batch.from_matrix(np.stack([anterior, np.cross(bone, anterior), bone], axis=-1))])
+
+
+CLAVICLE = _clavicle()  # of the right side, at rest, from the chest
+# OpenXR's wrist axes (-Z to the fingers, +Y out of the back of the hand) in ISB's, columns x, y, z
+ISB_FROM_WRIST = batch.from_matrix(np.array([[0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [-1.0, 0.0, 0.0]]))
+
+
 def _right_arm(arm: Arm) -> dict[str, Array]:
     """Poses (7,) of the right arm's bones in the chest's axes, from the chest."""
     swing = batch.exp(np.radians([-arm.abduction, 0.0, arm.flexion]))
@@ -68,18 +82,12 @@ def _right_arm(arm: Arm) -> dict[str, Array]:
     wrist = batch.multiply(_about(2, arm.wrist_flexion), batch.multiply(_about(0, arm.deviation), _about(1, arm.axial)))
     fore = batch.multiply(upper, elbow)
     isb_hand = batch.multiply(fore, wrist)
-    openxr_from_columns = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [-1.0, 0.0, 0.0]])
-    hand = batch.multiply(isb_hand, batch.from_matrix(openxr_from_columns))
+    hand = batch.multiply(isb_hand, ISB_FROM_WRIST)
     shoulder = np.array([HALF_WIDTH_M, 0.0, 0.0])
     elbow_at = shoulder + batch.rotate(upper, np.array([0.0, -UPPER_ARM_M, 0.0]))
     wrist_at = elbow_at + batch.rotate(fore, np.array([0.0, -FOREARM_M, 0.0]))
-    root = HALF_WIDTH_M * np.array(STERNOCLAVICULAR)
-    bone = (shoulder - root) / np.linalg.norm(shoulder - root)
-    anterior = np.cross([0.0, 1.0, 0.0], bone)
-    anterior /= np.linalg.norm(anterior)
-    clavicle = batch.from_matrix(np.stack([anterior, np.cross(bone, anterior), bone], axis=-1))
     return {
-        "clavicle": np.concatenate([root, clavicle]),
+        "clavicle": CLAVICLE,
         "upper_arm": np.concatenate([shoulder, upper]),
         "forearm": np.concatenate([elbow_at, fore]),
         "hand": np.concatenate([wrist_at, hand]),

@@ -18,13 +18,18 @@ from mcap_ros2.decoder import DecoderFactory
 from postures import HANGING, RAISED, frame_of, motion, person
 from pythonosc.dispatcher import Dispatcher
 from pythonosc.osc_server import BlockingOSCUDPServer
+from typer.testing import CliRunner
 
+from arm_ik_service.cli import app
+from arm_ik_service.errors import SettingsError
 from arm_ik_service.exports import ros2
-from arm_ik_service.io.zenoh_bus import BusOptions, open_hub
+from arm_ik_service.io.zenoh_bus import BusOptions, open_client, open_hub
 from arm_ik_service.io.zenoh_streams import Bus, declare_stream, subscribe
 from arm_ik_service.programs.demo import free_endpoint
+from arm_ik_service.programs.exporter import Exporter
+from arm_ik_service.programs.sinks import VmcSink
 from arm_ik_service.wire.codec import encode
-from arm_ik_service.wire.messages import ArmsState
+from arm_ik_service.wire.messages import ArmsState, ControllerFrame
 
 Heard = SimpleQueue[tuple[str, Any]]
 
@@ -174,14 +179,44 @@ def test_a_port_where_nobody_listens_and_bytes_that_are_no_state_do_not_end_it(h
     ("arguments", "cause"),
     [
         (("vmc", "--to", "127.0.0.1:port"), "HOST:PORT"),
-        (("vmc", "--to", "no.such.host.invalid:39539"), "no.such.host.invalid"),
+        (("vrchat", "--to", "127.0.0.1:65536"), "HOST:PORT"),
         (("ros2", "--to", "127.0.0.1:1"), "--connect"),
     ],
 )
-def test_an_address_that_cannot_be_used_is_one_line(
-    hub: tuple[Bus, str], arguments: tuple[str, ...], cause: str
-) -> None:
-    program = Running("export", *arguments, "--connect", hub[1])
-    assert program.finish() == 2
-    assert len(program.lines) == 1
-    assert cause in program.lines[0]
+def test_an_address_that_cannot_be_used_is_refused_with_its_cure(arguments: tuple[str, ...], cause: str) -> None:
+    result = CliRunner().invoke(app, ["export", *arguments])
+    assert isinstance(result.exception, SettingsError)
+    assert cause in str(result.exception)
+
+
+def test_a_host_without_an_address_is_named() -> None:
+    with pytest.raises(SettingsError, match=r"no\.such\.host\.invalid"):
+        VmcSink("no.such.host.invalid", 39539)
+
+
+def test_several_people_are_not_mixed_on_a_sink_that_knows_one(hub: tuple[Bus, str]) -> None:
+    bus, endpoint = hub
+    heard: list[str] = []
+
+    class OnePerson:
+        many = False
+
+        def send(self, state: ArmsState, frame: ControllerFrame | None) -> None:
+            heard.append(state.avatar)
+
+        def close(self) -> None:
+            pass
+
+    with open_client(BusOptions(connect=(endpoint,)), wait_s=10.0) as client:
+        exporter = Exporter(client, OnePerson(), KEYS)
+        worker = Thread(target=exporter.run)
+        worker.start()
+        streams = {name: declare_stream(bus, KEYS.arms(name), "msgpack") for name in ("ann", "bob")}
+        for seq in range(200):
+            for name, stream in streams.items():
+                stream.put(encode(person(avatar=name, seq=seq)))
+            time.sleep(0.005)
+        assert wait_for(lambda: len(heard) > 10)
+        exporter.stop()
+        worker.join(5.0)
+    assert len(set(heard)) == 1
