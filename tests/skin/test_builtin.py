@@ -57,7 +57,7 @@ def test_the_command_writes_a_file_that_reads_back_as_the_same_arms(
 ) -> None:
     path = tmp_path / "arms.glb"
     assert command.main([str(path)]) == 0
-    assert "14328 vertices" in capsys.readouterr().out
+    assert "14712 vertices" in capsys.readouterr().out
     mesh, ours = read_gltf(path)[0], built_in_arms()
     np.testing.assert_allclose(mesh.vertices, ours.vertices, atol=1e-6)
     np.testing.assert_allclose(mesh.joints[: len(ours.names)], ours.joints, atol=1e-7)

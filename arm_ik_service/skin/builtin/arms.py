@@ -16,6 +16,7 @@ from arm_ik_service.skin.twist import split
 
 AROUND = 24  # vertices of a ring: 1 cm apart at the forearm
 RING_M = 0.012  # from ring to ring
+TOP_M = 0.0575  # the first ring, above the shoulder joint
 WIDEST_M = 0.08  # more than any half width of the limb
 NET_M = 0.0033  # grid of the hand: finer than the gaps between fingers
 SEAM_M = 0.012  # from the last ring to the hand's rim, above the wrist joint
@@ -31,7 +32,7 @@ _KNUCKLES = {"IndexProximal": (-0.001, -0.089, 0.0315), "LittleProximal": (-0.00
 
 @cache
 def built_in_arms() -> SkinnedMesh:
-    """Return the mesh (16 800 vertices) in OpenXR axes, the middle between the shoulders at the origin."""
+    """Return the mesh (14 700 vertices) in OpenXR axes, the middle between the shoulders at the origin."""
     right = _at_rest(_straight_arm())
     left = _mirrored(right)
     count, size = len(right.names), len(right.vertices)
@@ -79,7 +80,14 @@ def _straight_arm() -> SkinnedMesh:
 def _surface() -> tuple[Floats, Floats, Integers]:
     """Vertices, normals and triangles: rings from the shoulder to just above the wrist, a net from there on."""
     rim_y = WRIST_Y + SEAM_M
-    heights = np.arange(0.0575, rim_y + RING_M, -RING_M)
+    bend = -UPPER_ARM_M + ELBOW_BLEND_M, -UPPER_ARM_M - ELBOW_BLEND_M
+    heights = np.concatenate(
+        [
+            np.arange(TOP_M, bend[0], -RING_M),
+            np.arange(bend[0], bend[1], -0.5 * RING_M),  # where the elbow bends
+            np.arange(bend[1], rim_y + 0.8 * RING_M, -RING_M),
+        ]
+    )
     middle = limb(heights)[:, 2:]
     centres = np.stack([middle[:, 0], heights, middle[:, 1]], axis=-1)
     tube, tube_triangles = rings(distance, centres, WIDEST_M, AROUND)
