@@ -48,7 +48,10 @@ def step_batch(
             continue
         step_body(row.body, row.tracking, body_settings)
         for side in range(2):
-            step_arm(row.arms[side], row.body.targets[side], row.tracking.dt_s, solver_settings)
+            arm = row.arms[side]
+            if row.body.learning.arms:  # nobody measured this person: their arms are as long as they turn out to be
+                arm.chain.upper_arm_m, arm.chain.forearm_m = row.body.upper_arm, row.body.forearm
+            step_arm(arm, row.body.targets[side], row.tracking.dt_s, solver_settings)
         write_output(outputs[k], row.tracking, row.body, row.arms)
 
 

@@ -3,6 +3,7 @@
     ArmIkError
     ├── SettingsError        a settings file or option that cannot be used
     ├── ProfileError         a calibration profile that cannot be used
+    │   └── CalibrationError frames that no profile can be made from; says what to do differently
     ├── ModelError           an arm model that cannot be loaded or scaled
     ├── WireError            bytes that are not one of our messages
     │   ├── DecodeError      malformed, wrong shape or type; names the path of the field
@@ -29,6 +30,10 @@ class SettingsError(ArmIkError):
 
 class ProfileError(ArmIkError):
     """A calibration profile that cannot be used."""
+
+
+class CalibrationError(ProfileError):
+    """Frames that no profile can be made from: no T-pose, too little movement, nobody there."""
 
 
 class ModelError(ArmIkError):

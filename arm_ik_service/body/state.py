@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from arm_ik_service.body.learning import LEARNING
 from arm_ik_service.compiled import record_dtype
 
 ARM_LENGTH_OF_FIT = 0.56  # [m] of the people that the body's constants are from: lengths scale with the arm's
@@ -20,8 +21,11 @@ TARGET = record_dtype(
 )
 BODY = record_dtype(
     [
-        # measures, from the profile
+        # measures: from the profile, or learnt where it leaves them open
+        ("stature", np.float64),
         ("arm_length", np.float64),  # shoulder to wrist, straight
+        ("upper_arm", np.float64),
+        ("forearm", np.float64),
         ("half_width", np.float64),  # of the shoulders
         ("grip_from_wrist", POSE, (2,)),
         # the answer, in world axes; left, right
@@ -37,6 +41,7 @@ BODY = record_dtype(
         # memory
         ("started", np.int64),
         ("yaw", np.float64),  # of the chest, about +Y
+        ("learning", LEARNING),
         ("settled", np.float64),  # how far the shoulders have been found to sit below where they were thought to be
     ]
 )

@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from arm_ik_service.body.chest import step_chest
+from arm_ik_service.body.learning import initialise_learning, learn
 from arm_ik_service.body.profile import GripOffset, Profile
 from arm_ik_service.body.reach import soft_reach
 from arm_ik_service.body.shoulders import settle, step_shoulder
@@ -26,8 +27,10 @@ def initialise_body(body: Record, profile: Profile) -> None:
     """Set a BODY record to the measures of `profile`; its pose follows from the first frame."""
     for name in BODY.names or ():
         body[name] = np.zeros((), BODY[name])
-    body.arm_length = profile.body.upper_arm + profile.body.forearm
+    body.upper_arm, body.forearm = profile.body.upper_arm, profile.body.forearm
+    body.arm_length = body.upper_arm + body.forearm
     body.half_width = 0.5 * profile.body.shoulder_width
+    initialise_learning(body, profile)
     for k, offset in enumerate((profile.grip.left, profile.grip.right)):
         pose = _inverse_offset(offset)
         body.grip_from_wrist[k].position[:], body.grip_from_wrist[k].rotation[:] = pose[:3], pose[3:]
@@ -78,8 +81,13 @@ def step_body(body: Record, tracking: Record, settings: Record) -> None:
     for k in range(2):
         _place_wrist(body, tracking, k)
     step_chest(body, tracking.recentred_yaw, elapsed_s)
+    learns = settings.learns and body.learning.arms
+    if learns:
+        learn(body, tracking, elapsed_s)
     for k in range(2):
-        if tracking.hands[k].position_age_s == 0.0 and tracking.head.position_age_s == 0.0:  # both are seen
+        if (
+            not learns and tracking.hands[k].position_age_s == 0.0 and tracking.head.position_age_s == 0.0
+        ):  # both are seen
             settle(body, k, elapsed_s)
         step_shoulder(body, k)
         _set_target(body, k, dt_s, settings)

@@ -80,9 +80,9 @@ def _follow_position(
     else:
         moved = g.subtract(position, g.vector(channel.measured))
         g.store(channel.rate, g.scale(1.0 / since_s, moved))
+        smooth_position(channel, position, min(since_s, LONGEST_STEP_S), settings.smoothing)
     channel.source, channel.suspects = source, 0
     g.store(channel.measured, position)
-    smooth_position(channel, position, min(since_s, LONGEST_STEP_S), settings.smoothing)
     return True
 
 
@@ -132,9 +132,9 @@ def _follow_rotation(
     else:
         turned = g.log(g.multiply(rotation, g.conjugate(last)))
         g.store(channel.rate, g.scale(1.0 / since_s, turned))
+        smooth_rotation(channel, rotation, min(since_s, LONGEST_STEP_S), settings.smoothing)
     channel.source, channel.suspects = source, 0
     g.store(channel.measured, rotation)
-    smooth_rotation(channel, rotation, min(since_s, LONGEST_STEP_S), settings.smoothing)
     return True
 
 

@@ -20,7 +20,7 @@ from arm_ik_service.geometry.scalar import Quaternion, Vector
 OFF, LIGHT, STRONG = 0, 1, 2  # TrackingSettings.smoothing
 
 SLOPE_HZ = 2.0  # cutoff of the speed estimate
-STARTS_FOR_S = 0.05  # after a start the estimate is of no use, and the data passes as it is
+STARTS_FOR_S = 0.05  # after a start the estimate is of little use, and the data passes as it is
 # rest_hz; rise [Hz per m/s, per rad/s]; threshold [m/s, rad/s]; leash [m, rad]
 POSITION_FILTERS = ((0.0, 0.0, 0.0, 0.0), (1.6, 400.0, 0.06, 0.003), (0.8, 30.0, 0.04, 0.02))
 ROTATION_FILTERS = ((0.0, 0.0, 0.0, 0.0), (1.6, 100.0, 0.3, 0.02), (0.8, 10.0, 0.2, 0.1))
@@ -35,9 +35,10 @@ def _gain(cutoff_hz: float, dt_s: float) -> float:
 def _adaptive_gain(channel: Record, filters: Any, level: int, away: float, dt_s: float) -> float:
     """Update the slope; the gain to follow a sample with that is `away` [m, rad] from the output."""
     rest_hz, rise, threshold, leash = filters[level]
-    slope = g.lerp(g.vector(channel.slope), g.vector(channel.rate), _gain(SLOPE_HZ, dt_s))
-    g.store(channel.slope, slope)
     channel.restarted_s += dt_s
+    follow = max(_gain(SLOPE_HZ, dt_s), dt_s / channel.restarted_s)  # at first the mean of what there is
+    slope = g.lerp(g.vector(channel.slope), g.vector(channel.rate), follow)
+    g.store(channel.slope, slope)
     if level == OFF or channel.restarted_s < STARTS_FOR_S:
         return 1.0
     gain = _gain(rest_hz + rise * max(g.norm(slope) - threshold, 0.0), dt_s)

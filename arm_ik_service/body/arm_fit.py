@@ -1,0 +1,109 @@
+"""Arm lengths from someone who moves about: the elbow stays at one distance from the shoulder.
+
+The elbow is a fixed point of the hand's frame as long as the wrist is straight: `elbow_in_hand`, on the forearm's axis.
+Its distance to the shoulder is the length of the upper arm, whatever the arm does. That is one equation a frame for
+the shoulder's place in the chest (2), the shoulders' width (1), the elbow in the hand (3) and the upper arm (1), and
+the farthest reach is one more. Wrists bend and chests are estimates, so an equation is off by centimetres, and what the
+data do not say the proportions of people do: a maximum a posteriori fit, by Gauss-Newton.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from arm_ik_service.body.observation import Observation
+from arm_ik_service.body.profile import FOREARM_PER_STATURE, SHOULDER_WIDTH_PER_STATURE, UPPER_ARM_PER_STATURE
+from arm_ik_service.geometry import batch
+
+Array = npt.NDArray[np.float64]
+
+# standard deviations of what is assumed of people, chosen on the CMU and Xia recordings
+SHOULDER_UP_M, SHOULDER_BACK_M, HALF_WIDTH_M = 0.03, 0.02, 0.015
+ARM_LENGTH_PART = 0.08  # of what stature says
+LOG_SEGMENTS = 0.1  # of upper arm over forearm
+LEAST_ERROR_M = 0.05  # of an equation; more where the residuals are larger
+INDEPENDENT_PER_S, MOST_INDEPENDENT = 6.0, 60.0  # equations that a recording is worth: errors last, and repeat
+MOST_EQUATIONS = 1200
+REACH_PERCENTILE, REACH_ERROR_M = 99.0, 0.01
+GIRDLE_GIVES = 1.025  # reach over arm length of a stretched arm, seen from a shoulder that stays
+
+
+@dataclass(frozen=True)
+class ArmFit:
+    """Right arm; the left one is its mirror image."""
+
+    upper_arm_m: float
+    elbow_in_hand: Array  # (3,) [m] in the wrist frame
+    half_width_m: float
+    arm_length_deviation_m: float  # standard deviation of forearm and upper arm together
+    residual_m: float  # root mean square of the equations
+
+    @property
+    def forearm_m(self) -> float:
+        """Wrist to elbow."""
+        return float(np.linalg.norm(self.elbow_in_hand))
+
+    @property
+    def arm_length_m(self) -> float:
+        """Shoulder to wrist, straight."""
+        return self.upper_arm_m + self.forearm_m
+
+
+def _gauss_newton(residuals: Callable[[Array], Array], x: Array, steps: int = 12) -> tuple[Array, Array, Array]:
+    """Minimise a sum of squares; returns the argument, its covariance and the residuals there."""
+    h = 1e-6
+    covariance: Array = np.eye(len(x))
+    for _ in range(steps):
+        r = residuals(x)
+        jacobian = np.stack([(residuals(x + h * e) - r) / h for e in np.eye(len(x))], axis=1)
+        covariance = np.asarray(np.linalg.inv(jacobian.T @ jacobian), float)
+        x = x - np.clip(covariance @ (jacobian.T @ r), -0.1, 0.1)
+    return x, covariance, residuals(x)
+
+
+def fit_arm(observation: Observation, stature_m: float, *, axis_deviation_m: float) -> ArmFit:
+    """Fit to an observation; `axis_deviation_m` says how far the elbow may be from the hand's own axis.
+
+    Deterministic. Needs a few hundred frames to mean anything; the deviation says how much it does.
+    """
+    every = max(1, 2 * len(observation) // MOST_EQUATIONS)
+    wrists = observation.wrists[::every].reshape(-1, 7)
+    hands, rotations = wrists[:, :3], wrists[:, 3:]
+    upper, fore = UPPER_ARM_PER_STATURE * stature_m, FOREARM_PER_STATURE * stature_m
+    half = 0.5 * SHOULDER_WIDTH_PER_STATURE * stature_m
+    weight = np.sqrt(min(INDEPENDENT_PER_S * observation.seconds, MOST_INDEPENDENT) / len(hands))
+    error_m = LEAST_ERROR_M
+
+    def residuals(x: Array) -> Array:
+        shoulder, elbow_in_hand, upper_arm = np.array([x[2], x[0], x[1]]), x[3:6], x[6]
+        forearm = np.linalg.norm(elbow_in_hand)
+        length = forearm + upper_arm
+        elbows = hands + batch.rotate(rotations, elbow_in_hand)
+        equations = weight * (np.linalg.norm(elbows - shoulder, axis=1) - upper_arm) / error_m
+        reach = np.percentile(np.linalg.norm(hands - shoulder, axis=1), REACH_PERCENTILE)
+        overstretched = max(reach - GIRDLE_GIVES * length, 0.0) / REACH_ERROR_M
+        assumed = [
+            x[0] / SHOULDER_UP_M,
+            x[1] / SHOULDER_BACK_M,
+            (x[2] - half) / HALF_WIDTH_M,
+            x[3] / axis_deviation_m,
+            x[4] / axis_deviation_m,
+            (length / (upper + fore) - 1.0) / ARM_LENGTH_PART,
+            (np.log(upper_arm / forearm) - np.log(upper / fore)) / LOG_SEGMENTS,
+        ]
+        return np.concatenate([equations, [overstretched], assumed])
+
+    x = np.array([0.0, 0.0, half, 0.0, 0.0, fore, upper])
+    covariance = np.eye(len(x))
+    residual_m = error_m
+    for _ in range(3):  # the error of an equation is found from the residuals
+        x, covariance, r = _gauss_newton(residuals, x)
+        residual_m = float(np.sqrt(np.mean(r[: len(hands)] ** 2)) / weight * error_m)
+        error_m = max(LEAST_ERROR_M, residual_m)
+    along = np.concatenate([[0.0, 0.0, 0.0], x[3:6] / np.linalg.norm(x[3:6]), [1.0]])
+    deviation = float(np.sqrt(along @ covariance @ along))
+    return ArmFit(float(x[6]), x[3:6].copy(), float(x[2]), deviation, residual_m)

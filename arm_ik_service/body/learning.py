@@ -1,0 +1,95 @@
+"""The running estimate for people who never calibrate: stature from the height of the eyes, arm length from reach.
+
+Both are running percentiles: a step up or down a frame, in proportion so that they rest where the wanted share of
+time lies on either side; the steps shrink as time goes by. Only the samples count, so a replay learns the same.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from arm_ik_service.body.profile import BodyMeasures, Profile
+from arm_ik_service.compiled import Record, compiled, record_dtype
+from arm_ik_service.geometry import scalar as g
+
+EYES_PER_STATURE = 0.936  # eye height over stature: Drillis & Contini (1966)
+ARM_PER_STATURE = 0.332  # upper arm and forearm, of the same
+UPPER_ARM_PER_ARM = 0.56
+HALF_WIDTH_PER_STATURE = 0.103
+
+EYES_PERCENTILE = 0.75  # people crouch more than they jump
+EYES_M_S = 0.3  # speed of the estimate at first ...
+EYES_SETTLE_AFTER_S = 5.0  # ... and the time after which it is half of that
+STANDING_EYES_M = (1.3, 2.1)  # lower: seated, or a space without a floor, which says nothing of stature
+
+OVERSTRETCHED = 1.025  # reach over arm length of a stretched arm, the girdle's give included
+OVERSTRETCHED_TIME = 0.004  # share of the time that a hand may be farther away
+LENGTH_PER_S = 0.4  # speed of the estimate, as a part of the length
+LENGTH_SETTLES_AFTER_S = 30.0
+OUT_OF_HAND = 1.45  # a hand so many arm lengths away has let go of the controller
+LENGTH_RANGE = (0.96, 1.3)  # of what stature says: people rarely stretch fully, so little is taken away
+
+LEARNING = record_dtype(
+    [
+        ("stature", np.int64),  # 1 where it is to be learnt
+        ("width", np.int64),
+        ("arms", np.int64),
+        ("watched_s", np.float64),
+        ("eyes", np.float64),  # estimate of their height [m]
+        ("length", np.float64),  # estimate of the arms, as a part of what stature says
+    ]
+)
+
+
+def initialise_learning(body: Record, profile: Profile) -> None:
+    """Learn what the profile leaves open; a stature that is the default one counts as not stated."""
+    measures, learning = profile.body, body["learning"]
+    learning["arms"] = measures.upper_arm_m is None and measures.forearm_m is None
+    learning["width"] = measures.shoulder_width_m is None
+    learning["stature"] = learning["arms"] and measures.stature_m == BodyMeasures().stature_m
+    learning["eyes"] = EYES_PER_STATURE * measures.stature_m
+    learning["length"] = 1.0
+    body["stature"] = measures.stature_m
+
+
+@compiled
+def _learn_stature(body: Record, eyes_m: float, elapsed_s: float) -> None:
+    learning = body.learning
+    pace = EYES_M_S * elapsed_s / (1.0 + learning.watched_s / EYES_SETTLE_AFTER_S)
+    learning.eyes += pace * (EYES_PERCENTILE if eyes_m > learning.eyes else EYES_PERCENTILE - 1.0)
+    learning.eyes = g.clip(learning.eyes, STANDING_EYES_M[0], STANDING_EYES_M[1])
+    body.stature = learning.eyes / EYES_PER_STATURE
+    if learning.width:
+        body.half_width = HALF_WIDTH_PER_STATURE * body.stature
+
+
+@compiled
+def _learn_length(body: Record, k: int, elapsed_s: float) -> None:
+    side = -1.0 if k == 0 else 1.0
+    lateral = g.rotate(g.quaternion(body.chest_rotation), (side * body.half_width, 0.0, 0.0))
+    shoulder = g.add(g.vector(body.chest_position), lateral)
+    ratio = g.norm(g.subtract(g.vector(body.wrists[k].position), shoulder)) / body.arm_length
+    if ratio > OUT_OF_HAND:
+        return
+    learning = body.learning
+    pace = LENGTH_PER_S * elapsed_s / (1.0 + learning.watched_s / LENGTH_SETTLES_AFTER_S)
+    learning.length += pace * (1.0 - OVERSTRETCHED_TIME if ratio > OVERSTRETCHED else -OVERSTRETCHED_TIME)
+    learning.length = g.clip(learning.length, LENGTH_RANGE[0], LENGTH_RANGE[1])
+
+
+@compiled
+def learn(body: Record, tracking: Record, elapsed_s: float) -> None:
+    """Take one frame into the estimates, and the estimates into the body. Call where `body.learning.arms` is set."""
+    if tracking.head.position_age_s > 0.0:
+        return
+    learning = body.learning
+    eyes_m = tracking.head.position[1]
+    if learning.stature and STANDING_EYES_M[0] < eyes_m < STANDING_EYES_M[1]:
+        _learn_stature(body, eyes_m, elapsed_s)
+    for k in range(2):
+        if tracking.hands[k].position_age_s == 0.0:
+            _learn_length(body, k, elapsed_s)
+    learning.watched_s += elapsed_s
+    body.arm_length = learning.length * ARM_PER_STATURE * body.stature
+    body.upper_arm = UPPER_ARM_PER_ARM * body.arm_length
+    body.forearm = body.arm_length - body.upper_arm
