@@ -11,7 +11,7 @@ import typer
 from arm_ik_service.cli.options import Json, say, stopped_by_signals
 
 if TYPE_CHECKING:
-    from rich.table import Table
+    from rich.console import Console
 
     from arm_ik_service.bench.contender import Contender
     from arm_ik_service.bench.solvers import Comparison
@@ -71,9 +71,9 @@ def solvers(
     elif comparison.tasks:
         from rich.console import Console
 
-        # a pipe has no width of its own: give the table what it needs
-        wide = Console()
-        (wide if wide.is_terminal else Console(width=200)).print(_table(comparison))
+        terminal = Console()
+        # a pipe has no width of its own: give the tables what they need
+        _show(terminal if terminal.is_terminal else Console(width=130), comparison)
         for name, why in absent.items():
             typer.echo(f"{name}: {why}")
     if save is not None and comparison.tasks:
@@ -114,48 +114,55 @@ def _contenders(wanted: list[str] | None) -> tuple[list[Contender], dict[str, st
     return chosen, absent
 
 
-COLUMNS = (  # heading, field of Summary, format
+# heading, field of Summary, format
+COST = (
     ("µs p50", "us_p50", "{:.1f}"),
     ("p99", "us_p99", "{:.1f}"),
-    ("iter p50", "iterations_p50", "{:.0f}"),
+    ("iterations p50", "iterations_p50", "{:.0f}"),
     ("p95", "iterations_p95", "{:.0f}"),
     ("mm p50", "position_mm_p50", "{:.2f}"),
     ("p99", "position_mm_p99", "{:.2f}"),
-    ("deg p99", "orientation_deg_p99", "{:.2f}"),
+    ("degrees p99", "orientation_deg_p99", "{:.2f}"),
+)
+BEHAVIOUR = (
     ("stuck", "stuck", "{:d}"),
     ("of it alone", "stuck_unlike_others", "{:d}"),
     ("outside limits %", "outside_limits_percent", "{:.2f}"),
-    ("elbow cm", "elbow_cm", "{:.2f}"),
-    ("steps > 5 cm", "elbow_steps", "{:d}"),
-    ("jerk m/s³", "elbow_jerk", "{:.0f}"),
+    ("elbow off cm", "elbow_cm", "{:.2f}"),
+    ("elbow steps", "elbow_steps", "{:d}"),
+    ("elbow jerk m/s³", "elbow_jerk", "{:.0f}"),
 )
+LEGEND = """\
+limits: all = the arm's own; box = its six hinges and a box around the shoulder's region; none.
+Times are of one arm and frame; {name} is timed in blocks of {block} frames, the others frame by frame.
+stuck: frames with the hand more than 10 mm off; of it alone: where another solver inside the limits met the target.
+outside limits: frames beyond a limit of the arm by more than a degree. elbow off: from the recorded elbow.
+elbow steps: frames into which it moves more than 5 cm. elbow jerk: root mean square."""
 
 
-def _table(comparison: Comparison) -> Table:
+def _show(console: Console, comparison: Comparison) -> None:
+    """Print two tables and what their headings mean."""
     from rich.table import Table
 
     from arm_ik_service.bench.contender import COMPILED_BLOCK
+    from arm_ik_service.ik.registry import DEFAULT
 
     rows = comparison.summaries()
+    about = {contender.name: contender for contender in comparison.contenders}
     frames = sum(len(task.targets) for task in comparison.tasks)
     position_mm = 1e3 * comparison.tolerances.position_m
     orientation_deg = math.degrees(comparison.tolerances.orientation_rad)
-    table = Table(
-        title=f"{len(comparison.tasks)} arms, {frames} frames, to {position_mm:g} mm and {orientation_deg:.1f}°",
-        caption="stuck: hand more than 10 mm off; of it alone: where another solver inside the limits met the target.\n"
-        "limits: all = the arm's own; box = six hinges and a box around the shoulder's region; none.\n"
-        "elbow cm: from the recorded elbow; jerk of the elbow, RMS. "
-        f"jacobian_transpose is timed in blocks of {COMPILED_BLOCK} frames, the others frame by frame.",
-    )
-    for heading in ("solver", "version", "limits"):
-        table.add_column(heading, no_wrap=True)
-    for heading, _, _ in COLUMNS:
-        table.add_column(heading, justify="right")
-    about = {contender.name: (contender.version, contender.limits) for contender in comparison.contenders}
-    for name, summary in rows.items():
-        values = (getattr(summary, field) for _, field, _ in COLUMNS)
-        texts = (
-            "" if value is None else form.format(value) for value, (_, _, form) in zip(values, COLUMNS, strict=True)
-        )
-        table.add_row(name, *about.get(name, ("", "")), *texts)
-    return table
+    console.print(f"{len(comparison.tasks)} arms, {frames} frames, to {position_mm:g} mm and {orientation_deg:.1f}°")
+    for fact, columns in (("version", COST), ("limits", BEHAVIOUR)):
+        table = Table()
+        for heading in ("solver", fact):
+            table.add_column(heading, no_wrap=True)
+        for heading, _, _ in columns:
+            table.add_column(heading, justify="right")
+        for name, summary in rows.items():
+            values = [(getattr(summary, field), form) for _, field, form in columns]
+            texts = ["" if value is None else form.format(value) for value, form in values]
+            if any(texts):
+                table.add_row(name, str(getattr(about.get(name), fact, "")), *texts)
+        console.print(table)
+    console.print(LEGEND.format(name=DEFAULT, block=COMPILED_BLOCK), highlight=False, soft_wrap=True)

@@ -91,7 +91,7 @@ def test_the_weighted_jacobian_is_the_rate_at_which_the_residual_falls(arm: ArmM
 def test_reachable_targets_are_met_by_the_stated_share(arm: ArmModel, method: str) -> None:
     rng = np.random.default_rng(3)
     solver = build(method, arm)
-    goals = arm.random_configurations(60, rng, 0.95)
+    goals = arm.random_configurations(40, rng, 0.95)
     targets = arm.forward(goals)["hand"]
     near = arm.clamp([pin.integrate(arm.pinocchio, q, 0.05 * rng.standard_normal(9)) for q in goals])
     cold = [solver.solve(target) for target in targets]
