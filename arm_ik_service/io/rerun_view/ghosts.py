@@ -35,8 +35,7 @@ COLOURS: tuple[Colour, ...] = (
     (170, 170, 170),
 )
 RECORDED_COLOUR: Colour = (255, 255, 255)
-OPACITY = 150  # of 255: arms that agree show through each other
-RADIUS_M = 0.012
+RADIUS_M = 0.007  # thin: lines are opaque, and a dozen arms share one hand
 AXIS_M = 0.08
 
 
@@ -95,7 +94,7 @@ def _log_arm(recording: rr.RecordingStream, arm: Ghosts, colours: Mapping[str, C
     pose = rr.Transform3D.columns(translation=arm.target[:, :3], quaternion=arm.target[:, 3:])
     recording.send_columns(entity("target"), time, pose)
     for name, elbow in arm.elbow.items():
-        style = rr.LineStrips3D.from_fields(colors=[(*colours[name], OPACITY)], radii=[RADIUS_M])
+        style = rr.LineStrips3D.from_fields(colors=[colours[name]], radii=[RADIUS_M])
         recording.log(entity(name), style, static=True)
         points = np.stack([arm.shoulder, elbow, arm.wrist[name]], axis=1).astype(np.float32)
         recording.send_columns(entity(name), time, rr.LineStrips3D.columns(strips=list(points)))
