@@ -12,8 +12,9 @@ from arm_ik_service.body.learning import EYES_PER_STATURE, STANDING_EYES_M
 from arm_ik_service.body.profile import Profile
 from arm_ik_service.body.state import BODY
 from arm_ik_service.body.step import initialise_body, step_body
-from arm_ik_service.compiled import compiled
+from arm_ik_service.compiled import compiled, record_dtype
 from arm_ik_service.geometry import batch
+from arm_ik_service.geometry import scalar as g
 from arm_ik_service.settings import BodySettings, TrackingSettings, to_record
 from arm_ik_service.tracking.state import ACCEPTED, TRACKING
 from arm_ik_service.tracking.step import initialise_tracking, step_tracking
@@ -53,20 +54,53 @@ class Observation:
         return eyes / EYES_PER_STATURE if lowest <= eyes <= highest else None
 
 
+_SEEN = record_dtype(
+    [
+        ("t", np.float64),
+        ("eye_height_m", np.float64),
+        ("hand_speed", np.float64, (2,)),
+        ("chest", np.float64, (7,)),
+        ("grips", np.float64, (2, 7)),
+        ("wrists", np.float64, (2, 7)),
+    ]
+)
+
+
 @compiled
-def _observe(tracking: Any, body: Any, frames: Any, tracked: Any, placed: Any, seen: Any, ts: Any, bs: Any) -> None:
+def _all_seen(tracking: Any) -> bool:
+    seen = tracking.head.position_age_s == 0.0 and tracking.head.rotation_age_s == 0.0
+    for k in range(2):
+        hand = tracking.hands[k]
+        seen = seen and hand.position_age_s == 0.0 and hand.rotation_age_s == 0.0
+    return bool(seen)
+
+
+@compiled
+def _note(seen: Any, tracking: Any, body: Any) -> None:
+    seen.t = 1e-9 * tracking.sample_time_ns
+    seen.eye_height_m = tracking.head.position[1]
+    seen.chest[:3], seen.chest[3:] = body.chest_position, body.chest_rotation
+    for k in range(2):
+        hand, wrist = tracking.hands[k], body.wrists[k]
+        seen.hand_speed[k] = g.norm(g.vector(hand.linear_velocity))
+        seen.grips[k, :3], seen.grips[k, 3:] = hand.position, hand.rotation
+        seen.wrists[k, :3], seen.wrists[k, 3:] = wrist.position, wrist.rotation
+
+
+@compiled
+def _observe(tracking: Any, body: Any, frames: Any, seen: Any, tracking_settings: Any, body_settings: Any) -> int:
+    """Fill `seen` with the frames in which everything was seen; how many they are."""
+    count = 0
     for k in range(len(frames)):
         # a recording is in order by itself: no receive time is needed to judge it
-        seen[k] = step_tracking(tracking[0], frames[k], frames[k].sample_time_ns, ts) == ACCEPTED
-        if seen[k]:
-            body[0].settled = 0.0
-            step_body(body[0], tracking[0], bs)
-            for hand in range(2):
-                seen[k] = seen[k] and tracking[0].hands[hand].position_age_s == 0.0
-                seen[k] = seen[k] and tracking[0].hands[hand].rotation_age_s == 0.0
-            seen[k] = seen[k] and tracking[0].head.position_age_s == 0.0
-            tracked[k] = tracking[0]
-            placed[k] = body[0]
+        if step_tracking(tracking, frames[k], frames[k].sample_time_ns, tracking_settings) != ACCEPTED:
+            continue
+        body.settled = 0.0  # the shoulders as the measures put them
+        step_body(body, tracking, body_settings)
+        if _all_seen(tracking):
+            _note(seen[count], tracking, body)
+            count += 1
+    return count
 
 
 def observe(frames: np.ndarray[Any, Any], profile: Profile) -> Observation:
@@ -74,26 +108,20 @@ def observe(frames: np.ndarray[Any, Any], profile: Profile) -> Observation:
     tracking, body = np.zeros(1, TRACKING), np.zeros(1, BODY)
     initialise_tracking(tracking[0])
     initialise_body(body[0], profile)
-    tracked, placed = np.zeros(len(frames), TRACKING), np.zeros(len(frames), BODY)
-    seen = np.zeros(len(frames), np.bool_)
     settings = to_record(TrackingSettings()), to_record(BodySettings(learns=False))
-    _observe(tracking, body, frames, tracked, placed, seen, *settings)
-
-    tracked, placed = tracked[seen], placed[seen]
-    hands = tracked["hands"]
-    chest = np.concatenate([placed["chest_position"], placed["chest_rotation"]], axis=1)
-    chest_from_world = batch.inverse(chest)[:, None]
+    seen = np.zeros(len(frames), _SEEN)
+    seen = seen[: _observe(tracking[0], body[0], frames, seen, *settings)]
+    chest_from_world = batch.inverse(seen["chest"])[:, None]
     return Observation(
-        t=tracked["sample_time_ns"] * 1e-9,
-        eye_height_m=tracked["head"]["position"][:, 1].copy(),
-        hand_speed=np.linalg.norm(hands["linear_velocity"], axis=2),
-        grips=_as_right(chest_from_world, hands),
-        wrists=_as_right(chest_from_world, placed["wrists"]),
+        t=seen["t"],
+        eye_height_m=seen["eye_height_m"],
+        hand_speed=seen["hand_speed"],
+        grips=_as_right(batch.compose(chest_from_world, seen["grips"])),
+        wrists=_as_right(batch.compose(chest_from_world, seen["wrists"])),
     )
 
 
-def _as_right(chest_from_world: Array, poses: np.ndarray[Any, Any]) -> Array:
-    """Poses (N, 2, 7) in the chest's frame, the left ones mirrored."""
-    in_chest = batch.compose(chest_from_world, np.concatenate([poses["position"], poses["rotation"]], axis=2))
-    in_chest[:, 0] = batch.mirror_pose(in_chest[:, 0])
-    return in_chest
+def _as_right(poses: Array) -> Array:
+    """Poses (N, 2, 7) in the chest's frame with the left ones mirrored."""
+    poses[:, 0] = batch.mirror_pose(poses[:, 0])
+    return poses
