@@ -84,6 +84,25 @@ class Avatars:
         for side, model in enumerate(self._arms(profile)):
             initialise_arm(row.arms[side], model)
 
+    def resume(self, index: int, state: ArmsState) -> bool:
+        """Let the person in row `index`, at rest until now, go on from an answer that another process published.
+
+        The elbows stay where they were and the chest looks where it looked. An answer with a number that no arm has is
+        not used: returns whether it was.
+        """
+        row = self._rows[index]
+        configurations = [np.array(arm.configuration, np.float64) for arm in (state.left, state.right)]
+        for q in configurations:
+            if q.shape != (10,) or not np.isfinite(q).all() or abs(np.linalg.norm(q[:4]) - 1.0) > 1e-3:
+                return False
+            if np.abs(q[4:]).max() > np.pi:
+                return False
+        for arm, q in zip(row.arms, configurations, strict=True):
+            arm["configuration"] = q
+            arm["before"] = q
+            arm["started"] = 1  # not a first frame: it would choose the elbow afresh
+        return True
+
     def _arms(self, profile: Profile) -> tuple[ArmModel, ArmModel]:
         models = self._models.get(profile)
         if models is None:

@@ -58,9 +58,18 @@ class ServiceSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     encoding: Encoding = "msgpack"  # of what goes out; what comes in may be either
     max_avatars: Annotated[int, Meta(ge=1, le=100_000)] = 256  # rows are allocated at the start, about 6 KiB each
     max_message_bytes: Annotated[int, Meta(ge=512)] = 4096  # the largest honest frame is about 1 KiB, in JSON
+    # of one avatar: the fastest trackers give 1000 poses a second; what comes beyond is dropped before it is decoded
+    max_frames_per_s: Annotated[float, Meta(ge=1.0)] = 1000.0
+    rate_burst_s: Annotated[float, Meta(ge=0.1)] = 2.0  # so many seconds' frames may come at once, after a stall
     max_id_length: Annotated[int, Meta(ge=1, le=255)] = 64  # an id is also a file name and an entity path
     forget_after_s: Annotated[float, Meta(gt=0.0)] = 60.0  # a silent avatar gives its row back
     health_period_s: Annotated[float, Meta(ge=0.1)] = 1.0
+    # Several services: each hears only its own avatars, and looks out for others who speak. A new avatar waits a period
+    # for its first answer at the longest; the share of the others' traffic that is heard is look_out_s over the period.
+    look_out_period_s: Annotated[float, Meta(ge=0.05)] = 0.25
+    look_out_s: Annotated[float, Meta(ge=0.01)] = 0.04  # longer than the interval between two frames at 30 Hz
+    # between saying that we are there and answering: whoever answered until then has heard it, nobody answers twice
+    hand_over_s: Annotated[float, Meta(ge=0.0)] = 0.1
 
 
 class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

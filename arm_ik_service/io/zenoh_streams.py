@@ -56,16 +56,21 @@ def subscribe(bus: Bus, key: str, receive: Callable[[str, bytes, int], None]) ->
 
 
 def answer_queries(
-    bus: Bus, key: str, answers: Callable[[], Iterable[tuple[str, bytes]]], encoding: Encoding
+    bus: Bus, key: str, answers: Callable[[], Iterable[tuple[str, Callable[[], bytes | None]]]], encoding: Encoding
 ) -> zenoh.Queryable[None]:
-    """Answer queries that meet the key expression `key` with those of `answers()` whose own key is asked for."""
+    """Answer queries that meet the key expression `key` with those of `answers()` whose own key is asked for.
+
+    Only what is asked for is made: a thread of Zenoh's that makes it for everybody would hold up the poses.
+    """
     form = zenoh.Encoding(MEDIA_TYPES[encoding])
 
     def reply(query: zenoh.Query) -> None:
         asked = query.key_expr
-        for own_key, payload in answers():
+        for own_key, make in answers():
             if asked.intersects(zenoh.KeyExpr(own_key)):
-                query.reply(own_key, payload, encoding=form)
+                payload = make()
+                if payload is not None:
+                    query.reply(own_key, payload, encoding=form)
 
     return bus.declare_queryable(key, reply)
 
@@ -80,3 +85,29 @@ def query(bus: Bus, key: str) -> Iterator[tuple[str, bytes]]:
 def announce(bus: Bus, key: str) -> Any:
     """Declare a liveliness token: it is there exactly as long as this process is."""
     return bus.liveliness().declare_token(key)
+
+
+def living(bus: Bus, key: str) -> list[str]:
+    """Return the keys of the liveliness tokens there are under a key expression."""
+    replies = bus.liveliness().get(key, timeout=QUERY_TIMEOUT_S)
+    return [str(reply.ok.key_expr) for reply in replies if reply.ok is not None]
+
+
+def watch_liveliness(bus: Bus, key: str, see: Callable[[str, bool], None]) -> zenoh.Subscriber[None]:
+    """Call `see(key, alive)` for every token there is, comes or goes, on Zenoh's network thread: store and return."""
+
+    def received(sample: zenoh.Sample) -> None:
+        see(str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT)
+
+    handler = zenoh.handlers.Callback(received, indirect=False)
+    return bus.liveliness().declare_subscriber(key, handler, history=True)
+
+
+def query_later(bus: Bus, key: str, receive: Callable[[str, bytes], None]) -> None:
+    """Ask for a key expression and call `receive(key, payload)` for each answer, on Zenoh's network thread."""
+
+    def received(reply: zenoh.Reply) -> None:
+        if reply.ok is not None:
+            receive(str(reply.ok.key_expr), reply.ok.payload.to_bytes())
+
+    bus.get(key, zenoh.handlers.Callback(received, indirect=False), timeout=QUERY_TIMEOUT_S)

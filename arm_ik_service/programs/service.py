@@ -1,113 +1,117 @@
-"""The service: newest frames in, both arms out, for every avatar that speaks; health once a second.
+"""The service: newest frames in, both arms out, for every avatar that is its own; health once a second.
 
-Bad input is counted by cause and reported once a second; it is never fatal and never another avatar's problem.
+Bad input is counted by cause and reported once a second; it is never fatal and never another avatar's problem. Alone it
+serves everybody. One of several serves its share, takes over what another leaves behind, and gives up what a new one
+is to have.
 """
 
 from __future__ import annotations
 
 import gc
 import logging
+import os
 import time
-from collections.abc import Iterator
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
 
-import numpy as np
+import msgspec
 
 import arm_ik_service
 from arm_ik_service.avatar import Avatars
 from arm_ik_service.body.profile import Profile
-from arm_ik_service.errors import DecodeError, VersionError
-from arm_ik_service.io.zenoh_inbox import Arrival, Inbox
-from arm_ik_service.io.zenoh_streams import Bus, Stream, announce, answer_queries, declare_stream, put_once
+from arm_ik_service.errors import DecodeError, ModelError, ProfileError, VersionError, WireError
+from arm_ik_service.io.zenoh_inbox import Arrival, Inbox, InboxLimits
+from arm_ik_service.io.zenoh_streams import Bus, answer_queries, declare_stream, put_once, query_later
+from arm_ik_service.programs.fleet import Fleet
+from arm_ik_service.programs.seats import Latencies, Seat
 from arm_ik_service.settings import Settings
 from arm_ik_service.skeleton import skeleton_of
 from arm_ik_service.tracking.state import ACCEPTED, REFUSALS
 from arm_ik_service.wire import codec
 from arm_ik_service.wire.keys import Keys
-from arm_ik_service.wire.messages import VERSION, AvatarHealth, Health
+from arm_ik_service.wire.messages import VERSION, Health
 
 log = logging.getLogger("arm_ik.service")
 
 BATCH = 8  # frames solved by one call: more saves little per frame and delays the first of them
-
-
-@dataclass(slots=True)
-class Seat:
-    """One avatar being served."""
-
-    name: str
-    index: int
-    publisher: Stream
-    profile: Profile
-    last_arrival_ns: int
-    answered: int = 0
-    overtaken: int = 0
-    refused: int = 0
-    answered_at_health: int = 0
-
-
-@dataclass(slots=True)
-class _Latencies:
-    """Receive-to-publish times of the last health period, in a ring that is allocated once."""
-
-    ring_ns: Any = field(default_factory=lambda: np.zeros(32_768, np.int64))
-    count: int = 0
-
-    def add(self, nanoseconds: int) -> None:
-        self.ring_ns[self.count % len(self.ring_ns)] = nanoseconds
-        self.count += 1
-
-    def take_ms(self) -> tuple[float, float]:
-        """Return p50 and p99 [ms] since the last call."""
-        seen = self.ring_ns[: min(self.count, len(self.ring_ns))]
-        self.count = 0
-        if len(seen) == 0:
-            return 0.0, 0.0
-        p50, p99 = np.percentile(seen, [50, 99]) / 1e6
-        return float(p50), float(p99)
+CALIBRATIONS_EVERY = 16  # look-outs: how often the others are asked for their avatars' profiles
+_profiles = msgspec.msgpack.Decoder(Profile), msgspec.json.Decoder(Profile)
 
 
 class Service:
     """One process's worth of avatars on an open Zenoh session, which the caller closes."""
 
-    def __init__(self, session: Bus, *, name: str, settings: Settings, profile: Profile) -> None:
-        """Allocate and declare everything. Raises ModelError or ProfileError where no arm can be built."""
+    def __init__(
+        self, session: Bus, *, name: str, settings: Settings, profile: Profile, avatars: Avatars | None = None
+    ) -> None:
+        """Allocate and declare everything; `avatars` with room for a batch of BATCH stands in for our own.
+
+        Raises ModelError or ProfileError where no arm can be built, BusError where the name is taken.
+        """
         limits = settings.service
         self._session = session
         self._name = name
         self._limits = limits
         self._profile = profile
         self._keys = Keys(limits.key_prefix)
-        self._avatars = Avatars(settings, capacity=limits.max_avatars, batch=BATCH)
+        self._avatars = avatars or Avatars(settings, capacity=limits.max_avatars, batch=BATCH)
         # models and limits are read now rather than in front of somebody's first pose
         self._avatars.reset(0, profile)
         skeleton_of(name, profile)
         self._free = list(range(limits.max_avatars - 1, -1, -1))
         self._seats: dict[str, Seat] = {}
+        self._others_profiles: dict[str, Profile] = {}
         self._refused: dict[str, int] = {}
         self._details: dict[str, tuple[int, str]] = {}
         self._answered = 0
         self._overtaken = 0
-        self._latencies = _Latencies()
+        self._before = (0, 0, 0)  # answered, overtaken, refused at the last health
+        self._latencies = Latencies()
         self._started_s = time.monotonic()
         self._health_at_s = self._started_s
+        self._look_outs = 0
+        self._looking_out = False
+        self._look_out_at_s = float("inf")
+        self._services_changed = False
+        self._fleet = Fleet(session, self._keys, name, self._note_change)
         self._inbox = Inbox(
             session,
             self._keys,
-            max_message_bytes=limits.max_message_bytes,
-            max_avatars=limits.max_avatars,
-            max_id_length=limits.max_id_length,
+            InboxLimits(
+                max_message_bytes=limits.max_message_bytes,
+                max_id_length=limits.max_id_length,
+                max_avatars=limits.max_avatars,
+                max_frames_per_s=limits.max_frames_per_s,
+                rate_burst_s=limits.rate_burst_s,
+            ),
+            self._fleet.owns,
         )
         self._health = declare_stream(session, self._keys.health(name), limits.encoding)
         self._queryables = [
-            answer_queries(session, self._keys.skeleton(), self._skeletons, limits.encoding),
-            answer_queries(session, self._keys.calibration(), self._calibrations, limits.encoding),
+            answer_queries(session, key, partial(self._of_everybody, *made), limits.encoding)
+            for key, made in (
+                (self._keys.skeleton(), (self._keys.skeleton, self._skeleton)),
+                (self._keys.calibration(), (self._keys.calibration, self._calibration)),
+                (self._keys.arms(), (self._keys.arms, lambda seat: seat.last_payload)),
+            )
         ]
+        self._join()
         # what was built so far stays: to walk through it again would stall frames for tens of milliseconds
         gc.collect()
         gc.freeze()
-        self._token = announce(session, self._keys.liveliness(name))
+
+    def _join(self) -> None:
+        """Begin to hear. One of several waits until the others have given up what will be ours."""
+        if self._fleet.alone:
+            self._inbox.hear_everybody()
+            self._fleet.join()
+            return
+        self._inbox.look_out()
+        self._ask_for_calibrations()
+        self._fleet.join()
+        time.sleep(self._limits.hand_over_s)
+        self._services_changed = True
 
     def stop(self) -> None:
         """Make `run` return after the frame in hand; safe in a signal handler."""
@@ -118,12 +122,18 @@ class Service:
         gc.disable()
         try:
             while True:
-                arrivals = self._inbox.take(self._health_at_s - time.monotonic(), BATCH)
+                due_s = min(self._health_at_s, self._look_out_at_s)
+                arrivals = self._inbox.take(0.0 if self._services_changed else due_s - time.monotonic(), BATCH)
                 if arrivals is None:
                     return
+                if self._services_changed:
+                    self._share_out()
                 if arrivals:
                     self._answer(arrivals)
-                if time.monotonic() >= self._health_at_s:
+                now_s = time.monotonic()
+                if now_s >= self._look_out_at_s:
+                    self._look_out(now_s)
+                if now_s >= self._health_at_s:
                     self._publish_health()
                     gc.collect(1)
         finally:
@@ -133,18 +143,22 @@ class Service:
     def close(self) -> None:
         """Withdraw from the bus; the last health says what was served."""
         self._inbox.close()
+        self._fleet.leave()
         self._publish_health()
-        self._token.undeclare()
+
+    # --- frames
 
     def _answer(self, arrivals: list[Arrival]) -> None:
         """Decode, solve and publish one batch; what cannot be used is counted and leaves the rest alone."""
         began_ns = time.perf_counter_ns()
         batch = []
         for arrival in arrivals:
-            seat = self._seats.get(arrival.avatar) or self._seat(arrival)
-            seat.last_arrival_ns = arrival.receive_time_ns
-            seat.overtaken += arrival.overtaken
+            seat = self._seats.get(arrival.avatar)
             self._overtaken += arrival.overtaken
+            if seat is not None:
+                seat.last_arrival_ns = arrival.receive_time_ns
+                seat.overtaken += arrival.overtaken
+            assert arrival.payload is not None
             try:
                 frame = codec.controller_frames.decode(arrival.payload)
             except DecodeError as error:
@@ -153,7 +167,12 @@ class Service:
             except VersionError as error:
                 self._refuse("version", f"{arrival.avatar}: {error}", seat)
                 continue
-            batch.append((seat, frame, arrival, self._avatars.add(seat.index, frame, arrival.receive_time_ns)))
+            # a place is for whoever speaks our language: noise on a thousand keys takes none
+            seat = seat or self._seat(arrival)
+            if seat is not None:
+                batch.append((seat, frame, arrival, self._avatars.add(seat.index, frame, arrival.receive_time_ns)))
+        if not batch:
+            return
         self._avatars.step()
         solve_ns = time.perf_counter_ns() - began_ns
         encoding = self._limits.encoding
@@ -164,35 +183,121 @@ class Service:
                 continue
             publish_time_ns = time.time_ns()
             state = self._avatars.answer(place, frame, seat.name, arrival.receive_time_ns, solve_ns, publish_time_ns)
-            seat.publisher.put(codec.encode(state, encoding))
+            payload = codec.encode(state, encoding)
+            seat.publisher.put(payload)
+            seat.last_state, seat.last_payload = state, payload
             seat.answered += 1
             self._answered += 1
-            self._latencies.add(publish_time_ns - arrival.receive_time_ns)
+            latency_ns = publish_time_ns - arrival.receive_time_ns
+            seat.latency_max_ns = max(seat.latency_max_ns, latency_ns)
+            self._latencies.add(latency_ns)
 
-    def _seat(self, arrival: Arrival) -> Seat:
-        """Give an avatar heard for the first time a row, a publisher and its skeleton on the bus."""
+    def _seat(self, arrival: Arrival) -> Seat | None:
+        """Give an avatar a row, a publisher and its skeleton on the bus; where another served it, go on from there."""
+        name = arrival.avatar
+        if not self._fleet.owns(name):
+            return None  # it arrived before it was given up
+        if not self._free:
+            self._refuse("too_many_avatars", f"{name}: {self._limits.max_avatars} are served")
+            return None
         index = self._free.pop()
-        self._avatars.reset(index, self._profile)
-        seat = Seat(
-            arrival.avatar,
-            index,
-            declare_stream(self._session, self._keys.arms(arrival.avatar), self._limits.encoding),
-            self._profile,
-            arrival.receive_time_ns,
-        )
-        self._seats[arrival.avatar] = seat
-        put_once(self._session, *self._skeleton(seat), self._limits.encoding)
-        log.info("avatar %s: serving", arrival.avatar)
+        profile = self._others_profiles.pop(name, self._profile)
+        try:
+            self._avatars.reset(index, profile)
+        except (ModelError, ProfileError) as error:
+            log.warning("avatar %s: the profile it had elsewhere is not used: %s", name, error)
+            profile = self._profile
+            self._avatars.reset(index, profile)
+        last_answer = self._inbox.take_last_answer(name)
+        resumed = last_answer is not None and self._resume(index, last_answer)
+        stream = declare_stream(self._session, self._keys.arms(name), self._limits.encoding)
+        seat = Seat(name, index, stream, profile, arrival.receive_time_ns, overtaken=arrival.overtaken)
+        self._seats[name] = seat
+        if not self._fleet.alone:
+            self._inbox.hear(name)
+        put_once(self._session, self._keys.skeleton(name), self._skeleton(seat), self._limits.encoding)
+        log.info("avatar %s: %s", name, "taken over" if resumed else "serving")
         return seat
 
+    def _resume(self, index: int, payload: bytes) -> bool:
+        try:
+            return self._avatars.resume(index, codec.arms_states.decode(payload))
+        except WireError as error:
+            log.warning("an answer of another service cannot be read: %s", error)
+            return False
+
+    def _stand_up(self, seat: Seat, *, lives_on: bool) -> None:
+        """Give an avatar's place away: it fell silent, or lives on with another service."""
+        self._inbox.release(seat.name, seat.last_payload if lives_on else None)
+        del self._seats[seat.name]
+        seat.publisher.undeclare()
+        self._free.append(seat.index)
+
     def _forget_silent(self, now_ns: int) -> None:
-        silent = [s for s in self._seats.values() if now_ns - s.last_arrival_ns > self._limits.forget_after_s * 1e9]
-        for seat in silent:
-            self._inbox.forget(seat.name)
-            del self._seats[seat.name]
-            seat.publisher.undeclare()
-            self._free.append(seat.index)
-            log.info("avatar %s: silent for %.0f s, forgotten", seat.name, self._limits.forget_after_s)
+        after_s = self._limits.forget_after_s
+        for seat in [s for s in self._seats.values() if now_ns - s.last_arrival_ns > after_s * 1e9]:
+            self._stand_up(seat, lives_on=False)
+            log.info("avatar %s: silent for %.0f s, forgotten", seat.name, after_s)
+        self._inbox.forget_silent(after_s)
+
+    # --- sharing with other services
+
+    def _note_change(self) -> None:
+        """Run on a Zenoh thread: the loop does the rest."""
+        self._services_changed = True
+        self._inbox.wake()
+
+    def _share_out(self) -> None:
+        """Give up what is another's now, and hear what is ours."""
+        self._services_changed = False
+        self._inbox.forget_owners()
+        given_up = [seat for seat in self._seats.values() if not self._fleet.owns(seat.name)]
+        for seat in given_up:
+            self._stand_up(seat, lives_on=True)
+        gained = [avatar for avatar in self._inbox.others() if self._fleet.owns(avatar)]
+        self._looking_out = False
+        if self._fleet.alone:
+            self._inbox.end_look_out(hear_everybody=True)
+            self._look_out_at_s = float("inf")
+        else:
+            for avatar in (*self._seats, *gained):
+                self._inbox.hear(avatar)
+            self._inbox.end_look_out()
+            self._look_out_at_s = time.monotonic()
+        log.info(
+            "services: %s; %d avatars given up, %d taken over",
+            ", ".join(sorted(self._fleet.services)),
+            len(given_up),
+            len(gained),
+        )
+
+    def _look_out(self, now_s: float) -> None:
+        """Begin or end a moment of hearing everybody."""
+        if self._looking_out:
+            self._inbox.end_look_out()
+            self._look_out_at_s = now_s + self._limits.look_out_period_s - self._limits.look_out_s
+        else:
+            self._inbox.look_out()
+            self._look_out_at_s = now_s + self._limits.look_out_s
+            if self._look_outs % CALIBRATIONS_EVERY == 0:
+                self._ask_for_calibrations()
+            self._look_outs += 1
+        self._looking_out = not self._looking_out
+
+    def _ask_for_calibrations(self) -> None:
+        query_later(self._session, self._keys.calibration(), self._note_calibration)
+
+    def _note_calibration(self, key: str, payload: bytes) -> None:
+        """Run on a Zenoh thread: keep another's profile for the day its avatar is ours."""
+        avatar = self._keys.avatar_of(key)
+        if avatar in self._seats or len(self._others_profiles) >= 16 * self._limits.max_avatars:
+            return
+        try:
+            self._others_profiles[avatar] = _profiles[payload[:1] == b"{"].decode(payload)
+        except (msgspec.MsgspecError, UnicodeDecodeError):
+            log.warning("avatar %s: a calibration that cannot be read", avatar)
+
+    # --- what is told
 
     def _refuse(self, cause: str, detail: str, seat: Seat | None = None, count: int = 1) -> None:
         self._refused[cause] = self._refused.get(cause, 0) + count
@@ -211,12 +316,10 @@ class Service:
         self._forget_silent(now_ns)
         p50_ms, p99_ms = self._latencies.take_ms()
         period_s = self._limits.health_period_s
-        rows = []
-        for seat in self._seats.values():
-            rate = (seat.answered - seat.answered_at_health) / period_s
-            seat.answered_at_health = seat.answered
-            silent_s = max(0.0, (now_ns - seat.last_arrival_ns) / 1e9)
-            rows.append(AvatarHealth(seat.name, rate, seat.answered, seat.overtaken, seat.refused, silent_s))
+        counts = (self._answered, self._overtaken, sum(self._refused.values()))
+        answered, overtaken, refused = (count - before for count, before in zip(counts, self._before, strict=True))
+        self._before = counts
+        arrived = answered + overtaken + refused
         health = Health(
             version=VERSION,
             service=self._name,
@@ -228,26 +331,38 @@ class Service:
             refused=dict(self._refused),
             latency_p50_ms=p50_ms,
             latency_p99_ms=p99_ms,
-            avatars=tuple(rows),
+            avatars=tuple(
+                seat.health(now_ns, period_s, self._inbox.refused_of(seat.name)) for seat in self._seats.values()
+            ),
+            answered_share=answered / arrived if arrived else 1.0,
+            services=tuple(sorted(self._fleet.services)),
+            memory_bytes=_resident_bytes(),
         )
         self._health.put(codec.encode(health, self._limits.encoding))
         # an absolute schedule, but never a burst of healths after a stall
         self._health_at_s = max(self._health_at_s + period_s, time.monotonic())
 
-    def _skeleton(self, seat: Seat) -> tuple[str, bytes]:
-        message = skeleton_of(seat.name, seat.profile)
-        return self._keys.skeleton(seat.name), codec.encode(message, self._limits.encoding)
-
-    def _skeletons(self) -> Iterator[tuple[str, bytes]]:
+    def _of_everybody(
+        self, key_of: Callable[[str], str], make: Callable[[Seat], bytes | None]
+    ) -> Iterator[tuple[str, Callable[[], bytes | None]]]:
         """What there is to answer to a query; runs on a Zenoh thread."""
         for seat in list(self._seats.values()):
-            yield self._skeleton(seat)
+            yield key_of(seat.name), partial(make, seat)
 
-    def _calibrations(self) -> Iterator[tuple[str, bytes]]:
-        for seat in list(self._seats.values()):
-            yield self._keys.calibration(seat.name), codec.encode(seat.profile, self._limits.encoding)
+    def _skeleton(self, seat: Seat) -> bytes:
+        return codec.encode(skeleton_of(seat.name, seat.profile), self._limits.encoding)
+
+    def _calibration(self, seat: Seat) -> bytes:
+        return codec.encode(seat.profile, self._limits.encoding)
 
     def farewell(self) -> str:
         """Return one line that says what was served."""
         refused = ", ".join(f"{count} {cause}" for cause, count in self._refused.items()) or "none"
         return f"answered {self._answered} frames, overtaken {self._overtaken}, refused: {refused}"
+
+
+def _resident_bytes() -> int:
+    try:
+        return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+    except (OSError, ValueError, AttributeError):
+        return 0

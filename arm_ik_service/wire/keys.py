@@ -55,6 +55,10 @@ class Keys:
         """Liveliness token of a running service."""
         return self._under(f"arm_ik/{service}")
 
+    def service_of(self, key: str) -> str:
+        """Return the service's name of its liveliness token's key."""
+        return key.rsplit("/", 1)[1]
+
     def avatar_of(self, key: str) -> str:
         """Return the avatar id of a key made by one of the avatar methods."""
         return key.rsplit("/", 2)[1]

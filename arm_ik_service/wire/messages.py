@@ -154,7 +154,7 @@ class Skeleton(Struct, frozen=True):
 
 
 class AvatarHealth(Struct, frozen=True):
-    """One avatar over the last second."""
+    """One avatar of a service; rate, share and latency are of the last period, counts since it was taken on."""
 
     avatar: str
     frames_per_s: float
@@ -162,6 +162,10 @@ class AvatarHealth(Struct, frozen=True):
     overtaken: int  # frames that a newer one replaced before they were solved
     refused: int
     silent_s: float  # time since its last frame
+    answered_share: float = 1.0  # of the frames that arrived; under overload it is the same for everybody
+    latency_max_ms: float = 0.0  # receive to publish
+    position_error_m: float = 0.0  # of the worse hand, in the last answer
+    tracking: TrackingState = "lost"  # of the worse hand, in the last answer
 
 
 class Health(Struct, frozen=True):
@@ -175,6 +179,9 @@ class Health(Struct, frozen=True):
     answered: int
     overtaken: int
     refused: dict[str, int]  # cause -> count
-    latency_p50_ms: float  # receive to publish, over the last second
+    latency_p50_ms: float  # receive to publish, over the last period
     latency_p99_ms: float
     avatars: tuple[AvatarHealth, ...]
+    answered_share: float = 1.0  # of all frames of the last period
+    services: tuple[str, ...] = ()  # those that share the avatars, as this one sees it
+    memory_bytes: int = 0  # resident; 0 where the system does not say
