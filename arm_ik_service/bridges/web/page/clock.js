@@ -22,9 +22,9 @@ export class BridgeClock {
     return this.#pings.length > 0;
   }
 
-  // The quickest of the kept pings: its offset is wrong by half its round trip at most.
+  // The quickest of the kept pings, or null: its offset is wrong by half its round trip at most.
   get best() {
-    return this.#pings.reduce((a, b) => (b.roundTripMs < a.roundTripMs ? b : a));
+    return this.#pings.reduce((a, b) => (a && a.roundTripMs <= b.roundTripMs ? a : b), null);
   }
 
   forget() {

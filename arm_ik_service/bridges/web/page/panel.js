@@ -56,8 +56,8 @@ export class Panel {
     }
     const ms = (value) => (Number.isNaN(value) ? "-" : value.toFixed(1));
     show("latency", latency.count ? `${ms(latency.percentile(50))} ms, p99 ${ms(latency.percentile(99))} ms` : "-");
-    const { known, best } = link.clock;
-    show("clock", known ? `± ${(best.roundTripMs / 2).toFixed(1)} ms, ${offsetWords(best.offsetNs)}` : "-");
+    const best = link.clock.best;
+    show("clock", best ? `± ${(best.roundTripMs / 2).toFixed(1)} ms, ${offsetWords(best.offsetNs)}` : "-");
     show("frames", `${rate.toFixed(0)} Hz${link.dropped ? `, ${link.dropped} dropped` : ""}`);
   }
 }
