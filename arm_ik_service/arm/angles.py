@@ -1,7 +1,7 @@
 """The nine joint angles and the ISB shoulder angles that people read, from a configuration, with their rates.
 
-The shoulder is swing-twist from the hanging arm: flexion and abduction are the parts of the swing's rotation vector about
-the lateral and the anterior axis, so both vary smoothly at rest, where ISB's Y-X-Y angles are singular.
+The shoulder is swing-twist from the hanging arm: flexion and abduction are the parts of the swing's rotation vector
+about the lateral and the anterior axis, so both vary smoothly at rest, where ISB's Y-X-Y angles are singular.
 """
 
 from __future__ import annotations

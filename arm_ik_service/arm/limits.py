@@ -80,7 +80,7 @@ def swing_edge(chain: Record, cosine: float, sine: float) -> tuple[float, float]
 
 @compiled
 def swing_excess(chain: Record, direction: Vector) -> float:
-    """Angle [rad] by which the humerus' unit direction lies beyond the edge; negative inside, at least -1 deep inside."""
+    """Angle [rad] by which the humerus' unit direction lies beyond the edge; negative inside, -1 deep inside."""
     centre = chain.swing_centre
     along = direction[0] * centre[0] + direction[1] * centre[1] + direction[2] * centre[2]
     if along > chain.swing_surely_inside:
@@ -103,8 +103,8 @@ def swing_gradient(chain: Record, bone: Columns) -> Vector:
     along, x, y = dot(u, c), dot(u, a), dot(u, b)
     n = max(math.sqrt(x * x + y * y), 1e-9)
     slope = swing_edge(chain, x / n, y / n)[1]
-    # theta = atan2(n, along); its gradient over u is (along * n' - n * c), n' = (x a + y b) / n; azimuth: (x b - y a) / n^2
-    g = (0.0, 0.0, 0.0)
+    # theta = atan2(n, along) has the gradient along * n' - n * c over u, with n' = (x a + y b) / n;
+    # azimuth has (x b - y a) / n^2
     px, py = along * x / n + slope * y / (n * n), along * y / n - slope * x / (n * n)
     g = (px * a[0] + py * b[0] - n * c[0], px * a[1] + py * b[1] - n * c[1], px * a[2] + py * b[2] - n * c[2])
     # u' = omega x u in body axes: u = -y, so omega = (wx, 0, wz) moves it by wz x - wx z

@@ -109,9 +109,9 @@ class ArmModel:
 
     @property
     def swing_range(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Extremes [rad] of shoulder flexion and of shoulder abduction in the swing region, each over all of the other."""
+        """Extremes [rad] of shoulder flexion and of shoulder abduction in the swing region."""
         azimuth = np.linspace(-np.pi, np.pi, 721)
-        angle = np.clip(self._edge(azimuth), 0.0, np.pi - 1e-6)
+        angle = np.clip(self.swing_edge(azimuth), 0.0, np.pi - 1e-6)
         hinges = (np.zeros_like(angle),) * 7
         directions = self.configurations_at(angle, azimuth, *hinges)
         vectors = log(directions[:, :4])
@@ -151,7 +151,7 @@ class ArmModel:
         _excess_rows(self.chains, q.reshape(-1, 10), out.reshape(-1, 8))
         return out
 
-    def _edge(self, azimuth: Array) -> Array:
+    def swing_edge(self, azimuth: Array) -> Array:
         """Angle [rad] from the swing centre to the edge of the region at azimuths [rad]."""
         chain, k = self.chains[0], np.arange(5)[:, None]
         return np.asarray(chain.swing_cosines @ np.cos(k * azimuth) + chain.swing_sines @ np.sin(k * azimuth))
@@ -159,15 +159,15 @@ class ArmModel:
     def random_configurations(self, count: int, rng: np.random.Generator, share: float = 1.0) -> Array:
         """Draw configurations (count, 10) uniformly from the middle `share` of every range, swing region included."""
         azimuth = rng.uniform(-np.pi, np.pi, count)
-        edge = self._edge(azimuth)
+        edge = self.swing_edge(azimuth)
         return self.configurations_at(
             np.sqrt(rng.uniform(0.0, 1.0, count)) * share * edge,
             azimuth,
-            *(self._within(rng.uniform(-share, share, count), i) for i in range(7)),
+            *(self.within_range(rng.uniform(-share, share, count), i) for i in range(7)),
         )
 
     def configurations_at(self, angle: Array, azimuth: Array, twist: Array, *hinges: Array) -> Array:
-        """Configurations (N, 10) of a humerus `angle` [rad] from the swing centre at `azimuth`, twist and six hinges."""
+        """Configurations (N, 10) of a humerus `angle` from the swing centre at `azimuth`, twist and hinges [rad]."""
         chain = self.chains[0]
         u = (
             np.cos(angle)[:, None] * chain.swing_centre
@@ -184,7 +184,7 @@ class ArmModel:
         q[:, 4:] = np.stack(hinges, axis=-1)
         return q
 
-    def _within(self, share: Array, index: int) -> Array:
+    def within_range(self, share: Array, index: int) -> Array:
         """Map shares in [-1, 1] onto the range of the twist (index 0) or a hinge (1 to 6)."""
         lower, upper = self.twist_range if index == 0 else (self.lower[index - 1], self.upper[index - 1])
         return np.asarray(0.5 * (lower + upper) + 0.5 * (upper - lower) * share)
@@ -267,7 +267,8 @@ def _limit(model: Any, numbers: dict[str, list[float]], limits: Mapping[str, tup
             raise ModelError(f"{path}: {name} has no finite range")
         if low > high:
             raise ModelError(
-                f"{path}: {name} has its lower limit {math.degrees(low):.1f} above its upper {math.degrees(high):.1f} deg"
+                f"{path}: {name} has its lower limit {math.degrees(low):.1f} "
+                f"above its upper {math.degrees(high):.1f} deg"
             )
         if max(-low, high) > math.pi:
             raise ModelError(f"{path}: {name} reaches beyond half a turn; ranges are within -180..180 deg")
@@ -307,7 +308,7 @@ def _flatten(model: Any, numbers: dict[str, list[float]], side: Side, path: Path
 
 
 def edge_series(edge_deg: Sequence[float]) -> tuple[Array, Array]:
-    """Fourier coefficients, cosines (5,) and sines (5,) [rad], of the curve through eight equally spaced angles [deg]."""
+    """Fourier cosines (5,) and sines (5,) [rad] of the curve through eight equally spaced angles [deg]."""
     series = np.fft.rfft(np.radians(edge_deg)) / 4.0
     series[[0, 4]] /= 2.0
     return series.real.copy(), -series.imag

@@ -1,9 +1,18 @@
-"""Where the elbow feels at home: the discomfort of a posture, and the turn of the swivel that lowers it.
+"""Where the elbow feels at home: the discomfort of a posture, and how it changes with the elbow's swivel.
 
 Hand position and rotation leave the elbow's swivel free. People choose it so that no joint is far from the middle of
-its use: a quadratic in pronation, wrist flexion, deviation and humeral twist, plus the pull of the upper arm's weight
-down and slightly out. The constants are fitted to recorded elbows by `tests/bench/fit_elbow_comfort.py` on the CMU and
-Xia recordings. Near a limit discomfort rises steeply, so that the elbow makes way before the hand is stuck.
+its use. Discomfort is a sum of
+
+- wrist flexion and deviation, quadratic while small and flat when large (a Cauchy penalty): a bent wrist is avoided,
+  but how a hand was mounted on its tracker shifts these angles, so a large one is no stronger evidence than a fair one,
+  and half of what is usual for a person counts as their rest;
+- pronation, quadratic around its rest;
+- humeral twist, quadratic around a rest that depends on where the upper arm points (Donders' law of the arm: Hore,
+  Watts & Vilis 1992; Gielen et al. 1997);
+- the pull of the upper arm's weight, down and slightly out of the body's way;
+- a rise ahead of every limit, so that the elbow makes way before the hand is stuck.
+
+The constants are fitted to recorded elbows by `tests/bench/fit_elbow_comfort.py`, on the CMU and Xia recordings alone.
 """
 
 from __future__ import annotations
@@ -16,55 +25,64 @@ from arm_ik_service.arm.limits import twist_of
 from arm_ik_service.compiled import Record, compiled
 from arm_ik_service.ik.swivel import Posture, Reach, posture_at, violation
 
-# Names and values of the fitted constants; angles in radians, weights per squared radian, pulls per unit direction.
+# The fitted constants, in the order of the record field `comfort`: angles [rad], weights [1/rad^2], the rest of the
+# twist per unit of the humerus' direction [rad], pulls per unit of it.
 COMFORT: dict[str, float] = {
-    "pronation_rest": 1.11,
+    "pronation_rest": 1.35,
     "pronation_weight": 0.05,
-    "flexion_weight": 0.48,
-    "flexion_scale": 3.0,
-    "deviation_weight": 1.57,
-    "deviation_scale": 3.0,
-    "twist_weight": 0.25,
-    "twist_rest": -0.36,
-    "twist_forward": 0.0,
-    "twist_up": 0.0,
-    "twist_out": 0.0,
-    "pull_down": 0.86,
-    "pull_out": 0.74,
-    "pull_forward": 0.11,
-    "limit_margin": 0.05,
-    "limit_weight": 3.0,
-    "twist_scale": 3.0,
+    "flexion_weight": 1.2,
+    "deviation_weight": 1.75,
+    "twist_weight": 0.24,
+    "twist_rest": 0.0,
+    "twist_forward": 0.3,
+    "twist_up": 0.35,
+    "twist_out": -0.8,
+    "pull_down": 0.4,
+    "pull_out": 0.9,
 }
+WRIST_SCALE = 0.5  # [rad] half of the wrist's functional range (Ryu et al. 1991): beyond, the penalty flattens
+HABIT_SHARE = 0.5  # of a person's usual wrist flexion and deviation that counts as their rest
+HABIT_TIME_S = 5.0  # over which the usual is averaged
+LIMIT_MARGIN = 0.05  # [rad] ahead of a limit where discomfort begins to rise
+LIMIT_WEIGHT = 3.0  # [1/rad^2] how steeply
 _PROBE = 0.06  # [rad] swivel difference for slope and curvature
 
 
 @compiled
-def discomfort(comfort: Any, chain: Record, posture: Posture) -> float:
-    """How far a posture is from comfortable; no unit, only differences mean anything. `comfort` is COMFORT's values."""
+def discomfort(comfort: Any, habit: Any, chain: Record, posture: Posture) -> float:
+    """How far a posture is from comfortable; no unit, only differences mean anything.
+
+    `comfort` is COMFORT's values, `habit` the person's usual wrist flexion and deviation [rad].
+    """
     upper_arm, _, pronation, flexion, deviation = posture
-    y = upper_arm[1]
+    y = upper_arm[1]  # the humerus points along -y
     p = pronation - comfort[0]
-    f, d = flexion / comfort[3], deviation / comfort[5]
-    t = twist_of(upper_arm) - comfort[7] + comfort[8] * y[0] + comfort[9] * y[1] + comfort[10] * y[2]
+    f, d = (flexion - HABIT_SHARE * habit[0]) / WRIST_SCALE, (deviation - HABIT_SHARE * habit[1]) / WRIST_SCALE
+    t = twist_of(upper_arm) - comfort[5] + comfort[6] * y[0] + comfort[7] * y[1] + comfort[8] * y[2]
     return (
         comfort[1] * p * p
-        + comfort[2] * comfort[3] * comfort[3] * math.log(1.0 + f * f)
-        + comfort[4] * comfort[5] * comfort[5] * math.log(1.0 + d * d)
-        + comfort[6] * comfort[16] * comfort[16] * math.log(1.0 + t * t / (comfort[16] * comfort[16]))
-        - comfort[11] * y[1]
-        + comfort[12] * y[2]
-        + comfort[13] * y[0]
-        + comfort[15] * violation(chain, posture, comfort[14])
+        + WRIST_SCALE * WRIST_SCALE * (comfort[2] * math.log(1.0 + f * f) + comfort[3] * math.log(1.0 + d * d))
+        + comfort[4] * t * t
+        - comfort[9] * y[1]
+        + comfort[10] * y[2]
+        + LIMIT_WEIGHT * violation(chain, posture, LIMIT_MARGIN)
     )
 
 
 @compiled
+def learn_habit(habit: Any, configuration: Any, dt_s: float) -> None:
+    """Move the usual wrist flexion and deviation towards those of a configuration (10,) held for dt_s."""
+    share = dt_s / (HABIT_TIME_S + dt_s)
+    habit[0] += share * (configuration[7] - habit[0])
+    habit[1] += share * (configuration[8] - habit[1])
+
+
+@compiled
 def slope_and_curvature(
-    comfort: Any, chain: Record, reach: Reach, rotation: Columns, swivel: float
+    comfort: Any, habit: Any, chain: Record, reach: Reach, rotation: Columns, swivel: float
 ) -> tuple[float, float]:
     """First and second derivative of discomfort over the swivel, by differences."""
-    here = discomfort(comfort, chain, posture_at(reach, rotation, swivel))
-    ahead = discomfort(comfort, chain, posture_at(reach, rotation, swivel + _PROBE))
-    behind = discomfort(comfort, chain, posture_at(reach, rotation, swivel - _PROBE))
+    here = discomfort(comfort, habit, chain, posture_at(reach, rotation, swivel))
+    ahead = discomfort(comfort, habit, chain, posture_at(reach, rotation, swivel + _PROBE))
+    behind = discomfort(comfort, habit, chain, posture_at(reach, rotation, swivel - _PROBE))
     return (ahead - behind) / (2.0 * _PROBE), (ahead - 2.0 * here + behind) / (_PROBE * _PROBE)

@@ -6,8 +6,8 @@ The error is e = (e_pos, e_rot) in the metric |e_pos|^2 + lam |e_rot|^2, lam a s
    a . (r x e_pos + lam e_rot).
 2. Column scaling: each entry is divided by its squared column norm |a x r|^2 + lam (a diagonal preconditioner) and
    multiplied by the joint's mobility.
-3. Limits: a joint at its bound whose step points outward is held, its step is zero; the shoulder's swing and twist limits
-   are held by projecting the step onto their tangents, orthogonally in the metric of 2.
+3. Limits: a joint at its bound whose step points outward is held, its step is zero; the shoulder's swing and twist
+   limits are held by projecting the step onto their tangents, orthogonally in the metric of 2.
 4. Polak-Ribiere+ conjugate direction s, restarted whenever the held set changes.
 5. The exact step of the linearised problem, <J s, e> / <J s, J s>, at most MAX_STEP, then every limit is projected.
    A step that makes the error larger is taken back to a quarter of its length.

@@ -2,10 +2,12 @@
 
 1. The elbow's swivel turns towards comfort, at most as fast as a stated bound.
 2. `converge` brings the hand onto the target.
-3. A hand that is stuck short of its target although some other swivel could meet it (a limit in the way) starts again
-   from the closed form at the nearest such swivel, within the same budget.
-4. A target that limits or reach forbid: the position first. The loop goes on from where it stopped with the rotation
+3. A target that limits or reach forbid: the position first. The loop goes on from where it stopped with the rotation
    weighing a hundred times less.
+4. A position still missed although another swivel could meet it (a limit in the way): the arm starts again from the
+   closed form at the nearest such swivel, within the same budget. That is a jump of the elbow that the hand demands.
+5. A position met with the hand turned far off, although another swivel could meet both: the elbow travels there at a
+   bounded speed, over as many frames as it takes, and the hand keeps its position on the way.
 """
 
 from __future__ import annotations
@@ -17,17 +19,22 @@ from arm_ik_service.arm.limits import clamp_swing, clamp_twist
 from arm_ik_service.compiled import Record, compiled
 from arm_ik_service.geometry.scalar import Vector, clip, exp, multiply, scale
 from arm_ik_service.ik.clock import monotonic_ns
-from arm_ik_service.ik.comfort import discomfort, slope_and_curvature
-from arm_ik_service.ik.conjugate import OUT_OF_ITERATIONS, OUT_OF_TIME, SOLVED, converge
+from arm_ik_service.ik.comfort import discomfort, learn_habit, slope_and_curvature
+from arm_ik_service.ik.conjugate import OUT_OF_TIME, SOLVED, converge
 from arm_ik_service.ik.swivel import Reach, posture_at, reach_to, swivel_of, take, violation
 
 SEEDS = 24  # swivels looked at when there is no good start: every 15 degrees
 FLAT = 0.3  # curvature below which discomfort counts as flat: Newton's step would be too long
 GIVE_TIME_S = 0.3  # in which the carrying angle and the wrist's axial play come back to zero
 HALF_SURE = 1.0  # curvature at which the elbow's confidence is one half
-STUCK_M, STUCK_RAD = 2e-3, 0.02  # a hand further off than this is worth another start
+STUCK_M = 5e-3  # a position missed by more than this is worth a jump of the elbow
+STUCK_RAD = 0.26  # a hand turned further off than this (15 degrees) is worth the elbow's way to another swivel
+ESCAPE_HASTE = 2.0  # times swivel_speed_rad_s on that way
+ELBOW_STEP_M = 0.04  # [m] of the elbow in one frame of it, whatever the frame rate
+POSITION_ALONE = 1e-4  # share of the rotation's weight on that way
 POSITION_FIRST = 0.01  # share of the rotation's weight that is left once the target is known to be out of reach
 _NEARNESS = 0.02  # [1/rad] what a far swivel must gain to be preferred to a near one
+_POSSIBLE = 1e-3  # [rad^2] sum of squared excesses that axial play and carrying angle can make up for
 _ROOM = 0.1  # [rad] to the limits, wanted of the second other start
 _BETTER = 0.5  # a new start must at least halve the error: no alternation between two that are as good
 
@@ -38,7 +45,7 @@ def turn_to_comfort(arm: Record, settings: Record, reach: Reach, rotation: Colum
     chain, q = arm.chain, arm.configuration
     shoulder = (q[0], q[1], q[2], q[3])
     swivel = swivel_of(reach, columns_of(shoulder))
-    slope, curvature = slope_and_curvature(arm.comfort, chain, reach, rotation, swivel)
+    slope, curvature = slope_and_curvature(arm.comfort, arm.habit, chain, reach, rotation, swivel)
     arm.elbow_confidence = max(curvature, 0.0) / (max(curvature, 0.0) + HALF_SURE)
     # A critically damped follower, so that the swivel's speed is continuous and its lag is swivel_time_s.
     away = -slope / max(abs(curvature), FLAT)
@@ -65,7 +72,7 @@ def most_comfortable(arm: Record, reach: Reach, rotation: Columns) -> float:
     best, least = 0.0, math.inf
     for i in range(SEEDS):
         swivel = (i - SEEDS // 2) * (2.0 * math.pi / SEEDS)
-        cost = discomfort(arm.comfort, arm.chain, posture_at(reach, rotation, swivel))
+        cost = discomfort(arm.comfort, arm.habit, arm.chain, posture_at(reach, rotation, swivel))
         if cost < least:
             best, least = swivel, cost
     return best
@@ -105,45 +112,84 @@ def _converge(
 
 
 @compiled
-def reach_target(
-    arm: Record,
-    settings: Record,
-    position: Vector,
-    rotation: Columns,
-    reach: Reach,
-    stuck_m: float,
-    stuck_rad: float,
-) -> None:
-    """Bring the hand onto the target from the configuration at hand: steps 2 to 4. Leaves the outcome in `arm`.
+def _deadline(settings: Record) -> int:
+    return monotonic_ns() + int(1e3 * settings.time_limit_us) if settings.time_limit_us > 0.0 else 0
 
-    A hand left further off than `stuck_m` or `stuck_rad` is worth another start.
-    """
-    arm.restarted = 0
-    work = arm.work
-    deadline = 0
-    if settings.time_limit_us > 0.0:
-        deadline = monotonic_ns() + int(1e3 * settings.time_limit_us)
-    budget = settings.iterations
-    status = _converge(arm, settings, position, rotation, (2 * budget + 2) // 3, 1.0, deadline)
+
+@compiled
+def find_target(arm: Record, settings: Record, position: Vector, rotation: Columns, reach: Reach) -> None:
+    """Meet one target by itself from the configuration at hand: other starts are as good as the one given."""
+    arm.restarted, arm.escape = 0, 0.0
+    work, budget, deadline = arm.work, settings.iterations, _deadline(settings)
+    status = _converge(arm, settings, position, rotation, _first_share(budget), 1.0, deadline)
     used = work.iterations
     for attempt in range(2):
-        if _finished(status) or (work.position_error_m <= stuck_m and work.orientation_error_rad <= stuck_rad):
-            break
-        margin, nearness = (0.0, _NEARNESS) if attempt == 0 else (_ROOM, 0.0)
-        status, used = _start_again(arm, settings, position, rotation, reach, margin, nearness, used, status, deadline)
-    if status == OUT_OF_ITERATIONS and work.position_error_m <= STUCK_M:
-        status = _converge(arm, settings, position, rotation, max(budget - used, 0), 1.0, deadline)
-        used += work.iterations
+        if not _finished(status):
+            margin, nearness = (0.0, _NEARNESS) if attempt == 0 else (_ROOM, 0.0)
+            status, used = _start_again(
+                arm, settings, position, rotation, reach, margin, nearness, used, status, deadline
+            )
     if not _finished(status) and work.position_error_m > settings.position_tolerance_m:
         _converge(arm, settings, position, rotation, max(budget - used, 0), POSITION_FIRST, deadline)
         used += work.iterations
-    work.iterations = used
-    arm.status = status
+    work.iterations, arm.status = used, status
+
+
+@compiled
+def follow_target(arm: Record, settings: Record, position: Vector, rotation: Columns, reach: Reach) -> None:
+    """Meet the next of a stream of targets from the configuration at hand: steps 2 to 5."""
+    arm.restarted = 0
+    work, budget, deadline = arm.work, settings.iterations, _deadline(settings)
+    status = _converge(arm, settings, position, rotation, _first_share(budget), 1.0, deadline)
+    used = work.iterations
+    if not _finished(status) and work.position_error_m > settings.position_tolerance_m:
+        _converge(arm, settings, position, rotation, (budget - used) // 2, POSITION_FIRST, deadline)
+        used += work.iterations
+    for attempt in range(2):
+        if not _finished(status) and work.position_error_m > STUCK_M:
+            margin, nearness = (0.0, _NEARNESS) if attempt == 0 else (_ROOM, 0.0)
+            status, used = _start_again(
+                arm, settings, position, rotation, reach, margin, nearness, used, status, deadline
+            )
+    if not _finished(status) and work.orientation_error_rad > STUCK_RAD and work.position_error_m <= STUCK_M:
+        q = arm.configuration
+        swivel = swivel_of(reach, columns_of((q[0], q[1], q[2], q[3])))
+        wanted = nearest_possible(arm.chain, reach, rotation, swivel, 0.0, _NEARNESS)
+        if violation(arm.chain, posture_at(reach, rotation, wanted), 0.0) < _POSSIBLE:
+            arm.escape = wanted - swivel
+    work.iterations, arm.status = used, status
+
+
+@compiled
+def escape(arm: Record, settings: Record, position: Vector, rotation: Columns, reach: Reach, dt_s: float) -> None:
+    """Take one frame of the elbow's way to another swivel, the hand's position kept, its rotation as far as it goes."""
+    work, q, budget, deadline = arm.work, arm.configuration, settings.iterations, _deadline(settings)
+    radius = max(reach[2] * arm.chain.upper_arm_m, 1e-3)
+    most = min(ESCAPE_HASTE * settings.swivel_speed_rad_s * dt_s, ELBOW_STEP_M / radius)
+    turn = clip(arm.escape, -most, most)
+    swivel = swivel_of(reach, columns_of((q[0], q[1], q[2], q[3]))) + turn
+    posture = posture_at(reach, rotation, swivel)
+    take(arm.chain, posture, q)
+    arm.restarted, arm.swivel_speed = 1, 0.0
+    status = _converge(arm, settings, position, rotation, _first_share(budget), 1.0, deadline)
+    used = work.iterations
+    arm.escape = 0.0 if status == SOLVED or abs(arm.escape - turn) < 1e-3 else arm.escape - turn
+    if not _finished(status):  # the loop would slide back to where the hand was stuck
+        take(arm.chain, posture, q)
+        _converge(arm, settings, position, rotation, budget - used, POSITION_ALONE, deadline)
+        used += work.iterations
+    work.iterations, arm.status = used, status
+
+
+@compiled
+def _first_share(budget: int) -> int:
+    """Iterations before anything but the plain loop is tried."""
+    return (2 * budget + 2) // 3
 
 
 @compiled
 def _finished(status: int) -> bool:
-    return status == SOLVED or status == OUT_OF_TIME  # noqa: PLR1714, SIM109  numba compiles no `in` here as cheaply
+    return status in (SOLVED, OUT_OF_TIME)
 
 
 @compiled
@@ -186,8 +232,15 @@ def _start_again(
 def step_frame(arm: Record, settings: Record, position: Vector, rotation: Columns, dt_s: float) -> None:
     """Take one frame: `position` and `rotation` of the hand bone, right arm, ISB axes."""
     reach = reach_to(arm.chain, position)
-    turn_to_comfort(arm, settings, reach, rotation, dt_s)
-    reach_target(arm, settings, position, rotation, reach, STUCK_M, STUCK_RAD)
+    if arm.escape != 0.0:
+        escape(arm, settings, position, rotation, reach, dt_s)
+    else:
+        if arm.work.position_error_m <= STUCK_M:
+            turn_to_comfort(arm, settings, reach, rotation, dt_s)
+        else:  # a hand that cannot be met leaves no swivel free
+            arm.swivel_speed = 0.0
+        follow_target(arm, settings, position, rotation, reach)
+    learn_habit(arm.habit, arm.configuration, dt_s)
 
 
 @compiled
@@ -195,9 +248,5 @@ def first_frame(arm: Record, settings: Record, position: Vector, rotation: Colum
     """Take a frame without a past: start at the most comfortable swivel."""
     arm.swivel_speed = 0.0
     reach = reach_to(arm.chain, position)
-    take(
-        arm.chain,
-        posture_at(reach, rotation, most_comfortable(arm, reach, rotation)),
-        arm.configuration,
-    )
-    reach_target(arm, settings, position, rotation, reach, STUCK_M, STUCK_RAD)
+    take(arm.chain, posture_at(reach, rotation, most_comfortable(arm, reach, rotation)), arm.configuration)
+    find_target(arm, settings, position, rotation, reach)

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from arm_ik_service.arm.chain import columns_of, hand_to_arm, position_to_arm
 from arm_ik_service.arm.model import ArmModel
 from arm_ik_service.compiled import compiled
-from arm_ik_service.ik.frame_step import first_frame, reach_target, step_frame
+from arm_ik_service.ik.frame_step import find_target, first_frame, step_frame
 from arm_ik_service.ik.solver import Solution, Status, Track, as_targets
 from arm_ik_service.ik.state import new_arm
 from arm_ik_service.ik.swivel import reach_to
@@ -53,6 +53,10 @@ class JacobianTranspose:
         self._outcome = np.empty(4)
         self._rest = arm.rest
 
+    def set_comfort(self, constants: npt.ArrayLike) -> None:
+        """Replace the elbow's comfort: values in the order of `comfort.COMFORT`."""
+        self._arms["comfort"] = np.asarray(constants, float)
+
     def solve(self, shoulder_from_hand: npt.ArrayLike, start: npt.ArrayLike | None = None) -> Solution:
         """Solve one target (7,) from `start` (10,), the arm's rest if None; the elbow stays near the start's.
 
@@ -72,7 +76,7 @@ class JacobianTranspose:
         return Solution(configuration, int(iterations), position_error, orientation_error, _STATUSES[int(status)])
 
     def track(self, shoulder_from_hands: npt.ArrayLike, start: npt.ArrayLike | None = None) -> Track:
-        """Solve targets (N, 7) in order, one compiled call; without `start` the first is the most comfortable posture."""
+        """Solve targets (N, 7) in order, one compiled call; without `start` from the most comfortable posture."""
         targets = as_targets(shoulder_from_hands)
         count = len(targets)
         track = Track(
@@ -95,7 +99,7 @@ def _solve(arms: Any, settings: Any, target: Any, start: Any, configuration: Any
         arm.configuration[i] = start[i]
     position = position_to_arm(chain, (target[0], target[1], target[2]))
     rotation = columns_of(hand_to_arm(chain, (target[3], target[4], target[5], target[6])))
-    reach_target(arm, settings[0], position, rotation, reach_to(chain, position), 0.0, 0.0)
+    find_target(arm, settings[0], position, rotation, reach_to(chain, position))
     for i in range(10):
         configuration[i] = arm.configuration[i]
     outcome[0], outcome[1], outcome[2] = work.iterations, work.position_error_m, work.orientation_error_rad
@@ -118,7 +122,8 @@ def _track(
 ) -> None:
     arm, setting = arms[0], settings[0]
     chain, work = arm.chain, arm.work
-    arm.swivel_speed = 0.0
+    arm.swivel_speed, arm.escape, work.position_error_m = 0.0, 0.0, 0.0
+    arm.habit[:] = 0.0
     for i in range(10):
         arm.configuration[i] = start[i]
     for n in range(len(targets)):

@@ -12,8 +12,8 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from arm_ik_service.arm.limits import swing_excess, swing_gradient, twist_excess, twist_gradient, twist_of
 from arm_ik_service.arm.chain import columns_of
+from arm_ik_service.arm.limits import swing_excess, swing_gradient, twist_excess, twist_gradient, twist_of
 from arm_ik_service.arm.model import ArmModel
 from arm_ik_service.geometry.batch import mirror_pose
 from arm_ik_service.ik.conjugate import AT_LIMIT, MAX_STEP, MOBILITY, RETREATS, STATIONARY

@@ -22,7 +22,9 @@ ARM = record_dtype(
         ("started", np.int64),  # frames since the arm was at rest: 0, 1 or 2
         ("before", np.float64, (10,)),  # configuration one frame ago
         ("recent_velocity", np.float64, (9,)),  # mean over the last frame
+        ("habit", np.float64, (2,)),  # usual wrist flexion and deviation [rad]
         ("swivel_speed", np.float64),  # [rad/s] of the elbow about the arm's line, for comfort
+        ("escape", np.float64),  # [rad] swivel still to go to where the hand can be met; 0: none
         ("kept", np.float64, (10,)),  # the best so far while another start is tried
         # the answer; positions and rotations in the shoulder frame of the arm's own side
         ("configuration", np.float64, (10,)),
@@ -57,6 +59,9 @@ def initialise_arm(arm: Record, model: ArmModel) -> None:
     arm["velocity"] = 0.0
     arm["recent_velocity"] = 0.0
     arm["swivel_speed"] = 0.0
+    arm["habit"] = 0.0
+    arm["work"]["position_error_m"] = 0.0
+    arm["escape"] = 0.0
 
 
 def new_arm(model: ArmModel) -> npt.NDArray[Any]:

@@ -50,7 +50,7 @@ def step_arm(arm: Record, target: Record, dt_s: float, settings: Record) -> None
 
 @compiled
 def _move_on(arm: Record, settings: Record, linear: Any, angular: Any, dt_s: float) -> None:
-    """Find the joint velocity: recent motion carried on to now, corrected by the hand's twist, scaled to speed limits."""
+    """Find the joint velocity: recent motion carried on, corrected by the hand's twist, scaled to speed limits."""
     chain, velocity, recent, step = arm.chain, arm.velocity, arm.recent_velocity, arm.work.direction
     if arm.started == 0 or arm.restarted == 1:  # a jump is no motion
         for i in range(9):

@@ -5,8 +5,8 @@ elbow lies on a circle around the line from shoulder to wrist, the hand's rotati
 flexion and deviation (Tolani, Goswami & Badler 2000). The loop in `conjugate` does the solving; this says where the
 elbow should go, and gives it a start where it has none or is stuck.
 
-Swivel is the angle [rad] of the elbow around the line from shoulder to wrist, 0 where the elbow hangs lowest. It is read
-off the plane of the arm rather than off the elbow, so a straight arm has one too.
+Swivel is the angle [rad] of the elbow around the line from shoulder to wrist, 0 where the elbow hangs lowest. It is
+read off the plane of the arm rather than off the elbow, so a straight arm has one too.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 
 What goes out is the derivative of what goes out: the part that moves the hand follows from the hand's twist; the part
 that does not (the swivel drawn by comfort, the sharing between joints) from how the configuration has been moving,
-carried on to now. So the velocity is the one nearest to that recent motion, in the metric of the solve, that gives the hand
-its twist: conjugate gradients on the normal equations (Hestenes & Stiefel 1952), started at the recent motion.
+carried on to now. So the velocity is the one nearest to that recent motion, in the metric of the solve, that gives the
+hand its twist: conjugate gradients on the normal equations (Hestenes & Stiefel 1952), started at the recent motion.
 Lightly damped, so a straight arm stays finite; joints at a limit do not move outward.
 """
 
