@@ -48,7 +48,7 @@ OWNERS: dict[str, str | tuple[str, ...]] = {
     "numba": ("compiled", "ik.clock"),  # the clock of a solver's time limit is an LLVM intrinsic
     "xr": "bridges.openxr.pyopenxr",
     "aiohttp": "bridges.web.server",
-    "cryptography": "bridges.web.certificate",
+    "cryptography": ("bridges.web.certificate", "io.certificates"),
     "segno": "bridges.web.invitation",
 }
 

@@ -12,11 +12,13 @@ import typer
 
 from arm_ik_service.cli.bench import bench
 from arm_ik_service.cli.bridge import bridge
+from arm_ik_service.cli.certificates import certificates
 from arm_ik_service.cli.convert import convert
 from arm_ik_service.cli.demo import demo
 from arm_ik_service.cli.export import export
 from arm_ik_service.cli.record import record
 from arm_ik_service.cli.replay import replay
+from arm_ik_service.cli.router import router
 from arm_ik_service.cli.schema import schema
 from arm_ik_service.cli.serve import serve
 from arm_ik_service.cli.solve import solve
@@ -31,7 +33,7 @@ app = typer.Typer(
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (demo, serve, replay, record, view, solve, convert, export, schema):
+for command in (demo, serve, replay, record, view, solve, convert, export, schema, router, certificates):
     app.command()(command)
 app.add_typer(bench)
 app.add_typer(bridge, name="bridge")

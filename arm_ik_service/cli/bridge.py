@@ -11,6 +11,9 @@ from arm_ik_service.cli.options import (
     Connect,
     Listen,
     Scouting,
+    TlsAuthority,
+    TlsCertificate,
+    TlsKey,
     ZenohConfig,
     bus_options,
     say,
@@ -41,6 +44,9 @@ def web(
     listen: Listen = None,
     scouting: Scouting = False,
     zenoh_config: ZenohConfig = None,
+    tls_cert: TlsCertificate = None,
+    tls_key: TlsKey = None,
+    tls_ca: TlsAuthority = None,
 ) -> None:
     """Serve a page that a headset's browser opens: poses come from it, and it draws both arms in VR.
 
@@ -85,7 +91,9 @@ def web(
         with stopped_by_signals(stop):
             await web_bridge.run(host, stopped, ready)
 
-    with open_client(bus_options(connect, listen, scouting, zenoh_config), waiting=say) as bus:
+    with open_client(
+        bus_options(connect, listen, scouting, zenoh_config, tls_cert, tls_key, tls_ca), waiting=say
+    ) as bus:
         web_bridge = WebBridge(
             bus,
             Keys(prefix),

@@ -12,6 +12,9 @@ from arm_ik_service.cli.options import (
     Json,
     Listen,
     Scouting,
+    TlsAuthority,
+    TlsCertificate,
+    TlsKey,
     ZenohConfig,
     bus_options,
     say,
@@ -31,6 +34,9 @@ def record(
     listen: Listen = None,
     scouting: Scouting = False,
     zenoh_config: ZenohConfig = None,
+    tls_cert: TlsCertificate = None,
+    tls_key: TlsKey = None,
+    tls_ca: TlsAuthority = None,
 ) -> None:
     """Record everybody's controllers and arms to an MCAP file, until Ctrl-C.
 
@@ -50,7 +56,9 @@ def record(
     if output.exists() and not overwrite:
         raise SessionError(f"{output} exists: choose another name, or --overwrite")
     with (
-        open_client(bus_options(connect, listen, scouting, zenoh_config), waiting=say) as bus,
+        open_client(
+            bus_options(connect, listen, scouting, zenoh_config, tls_cert, tls_key, tls_ca), waiting=say
+        ) as bus,
         frames_progress(output.name, None) as advance,
     ):
         shown = 0

@@ -12,6 +12,9 @@ from arm_ik_service.cli.options import (
     Json,
     Listen,
     Scouting,
+    TlsAuthority,
+    TlsCertificate,
+    TlsKey,
     ZenohConfig,
     bus_options,
     say,
@@ -34,6 +37,9 @@ def replay(
     listen: Listen = None,
     scouting: Scouting = False,
     zenoh_config: ZenohConfig = None,
+    tls_cert: TlsCertificate = None,
+    tls_key: TlsKey = None,
+    tls_ca: TlsAuthority = None,
 ) -> None:
     """Publish a recorded session to Zenoh at the pace at which it was recorded.
 
@@ -55,7 +61,9 @@ def replay(
         check_id(avatar)
     recording = open_session(session)
     options = ReplayOptions(speed, loop, from_s, to_s, avatar, encoding)
-    with open_client(bus_options(connect, listen, scouting, zenoh_config), waiting=say) as bus:
+    with open_client(
+        bus_options(connect, listen, scouting, zenoh_config, tls_cert, tls_key, tls_ca), waiting=say
+    ) as bus:
         whole = not loop and from_s == 0.0 and to_s is None
         with frames_progress(session.name, recording.frame_count if whole else None) as progress:
             replayer = Replayer(bus, recording, options, Keys(prefix), progress=progress, warn=say)

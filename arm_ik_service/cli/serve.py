@@ -7,11 +7,15 @@ from typing import Annotated
 import typer
 
 from arm_ik_service.cli.options import (
+    Access,
     Connect,
     Listen,
     ProfileFile,
     Scouting,
     SettingsFile,
+    TlsAuthority,
+    TlsCertificate,
+    TlsKey,
     ZenohConfig,
     bus_options,
     say,
@@ -29,10 +33,15 @@ def serve(
     listen: Listen = None,
     scouting: Scouting = False,
     zenoh_config: ZenohConfig = None,
+    tls_cert: TlsCertificate = None,
+    tls_key: TlsKey = None,
+    tls_ca: TlsAuthority = None,
+    access: Access = None,
 ) -> None:
     """Solve both arms of everybody who publishes on avatar/<id>/controllers, and publish avatar/<id>/arms.
 
-    Listens on loopback, tcp/127.0.0.1:7447, unless told otherwise; no router is needed.
+    Listens on loopback, tcp/127.0.0.1:7447, unless told otherwise; no router is needed. Started several times, the
+    services share the avatars; with --connect and without --listen it is a client of a router or another service.
 
     Example: [bold]arm-ik serve --listen tcp/0.0.0.0:7447 --profile me.toml[/bold]
     """
@@ -45,6 +54,7 @@ def serve(
     from arm_ik_service.body.profile import load_profile
     from arm_ik_service.cli.warm_up import warm_up
     from arm_ik_service.io.zenoh_bus import open_hub
+    from arm_ik_service.io.zenoh_log import log_zenoh
     from arm_ik_service.settings import load_settings
     from arm_ik_service.wire.keys import check_id
 
@@ -52,15 +62,16 @@ def serve(
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
     host = re.sub(r"[^A-Za-z0-9_-]", "-", socket.gethostname())[:40]
     service_name = check_id(name or f"{host}-{os.getpid()}")
-    options = bus_options(connect, listen, scouting, zenoh_config)
+    options = bus_options(connect, listen, scouting, zenoh_config, tls_cert, tls_key, tls_ca, access)
     used_profile, used_settings = load_profile(profile), load_settings(settings)
-    with open_hub(options) as bus:
+    log_zenoh(denials=access is not None)
+    with open_hub(options, waiting=say) as bus:
         warm_up(used_settings, say)
         from arm_ik_service.programs.service import Service
 
         service = Service(bus, name=service_name, settings=used_settings, profile=used_profile)
         with stopped_by_signals(service.stop):
-            where = ", ".join(options.listens_on()) or str(zenoh_config)
+            where = ", ".join(options.listens_on() or options.connects_to()) or str(zenoh_config)
             say(f"ready in {time.perf_counter() - began_s:.1f} s: {service_name} serves on {where}; Ctrl-C ends it")
             service.run()
         service.close()

@@ -13,6 +13,9 @@ from arm_ik_service.cli.options import (
     Listen,
     Scouting,
     SkinningChoice,
+    TlsAuthority,
+    TlsCertificate,
+    TlsKey,
     ZenohConfig,
     bus_options,
     say,
@@ -38,6 +41,9 @@ def view(
     listen: Listen = None,
     scouting: Scouting = False,
     zenoh_config: ZenohConfig = None,
+    tls_cert: TlsCertificate = None,
+    tls_key: TlsKey = None,
+    tls_ca: TlsAuthority = None,
 ) -> None:
     """Show everybody's arms in Rerun, until Ctrl-C. Several outputs may be given together.
 
@@ -59,7 +65,9 @@ def view(
     if spawn or not sinks:
         sinks.append(Spawn())
     skin = skin_options(avatar, skinning)
-    with open_client(bus_options(connect, listen, scouting, zenoh_config), waiting=say) as bus:
+    with open_client(
+        bus_options(connect, listen, scouting, zenoh_config, tls_cert, tls_key, tls_ca), waiting=say
+    ) as bus:
         viewer = Viewer(bus, sinks, Keys(prefix), skin)
         for sink in sinks:
             if isinstance(sink, Web):

@@ -124,14 +124,6 @@ def _put_tls(files: TlsFiles, put: Callable[[str, Any], None]) -> None:
     )
 
 
-def log_zenoh_warnings() -> None:
-    """Let Zenoh itself say on standard output what it refuses: connections without the right certificate, and why.
-
-    `RUST_LOG` overrides it. Once for a process, before the first session.
-    """
-    zenoh.init_log_from_env_or("warn")
-
-
 def open_hub(options: BusOptions, *, waiting: Callable[[str], None] | None = None) -> zenoh.Session:
     """Open the session of a service. Raises BusError where the port is taken or the endpoint is wrong.
 
