@@ -38,7 +38,6 @@ OWNERS: dict[str, str | tuple[str, ...]] = {
     "rerun": "io.rerun_view",
     "mcap": ("io.recording", "exports.mcap_files"),
     "pinocchio": ("arm.", "ik.", "bench.peers"),
-    "pythonosc": "exports.osc",
     "rosbags": "exports.ros2",
     "foxglove": ("exports.foxglove_messages", "exports.mcap_files"),
     "pyarrow": "exports.table",

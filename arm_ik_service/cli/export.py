@@ -41,9 +41,9 @@ def export(
         float | None, typer.Option("--rate", metavar="HZ", min=1.0, help="Send no more often than this.")
     ] = None,
     lower_arm_twist: Annotated[
-        float | None,
-        typer.Option(min=0.0, max=1.0, help="vmc: share of the pronation in the lower arm, the rest in the hand. 0.5"),
-    ] = None,
+        float,
+        typer.Option(min=0.0, max=1.0, help="vmc: share of the pronation in the lower arm, the rest in the hand."),
+    ] = 0.5,
     chest: Annotated[bool, typer.Option("--chest", help="vrchat: send the chest as tracker 3.")] = False,
     domain: Annotated[int, typer.Option(min=0, max=232, help="ros2: ROS_DOMAIN_ID.")] = 0,
     way: Annotated[RosWay, typer.Option(help="ros2: for rmw_zenoh, for zenoh-bridge-ros2dds, or both.")] = RosWay.BOTH,
@@ -65,11 +65,12 @@ def export(
     from dataclasses import asdict
 
     from arm_ik_service.io.zenoh_bus import open_client
-    from arm_ik_service.programs.exporter import Exporter
+    from arm_ik_service.programs.exporter import Exporter, give_way
     from arm_ik_service.programs.sinks import BodyTrackingSink, Ros2Sink, VmcSink, VrChatSink
     from arm_ik_service.wire.keys import Keys
 
     host, port = _address(dialect, to)
+    give_way()
 
     def sink_on(bus: Bus) -> Sink:
         if dialect is LiveDialect.VMC:

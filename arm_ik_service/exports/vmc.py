@@ -19,7 +19,6 @@ from arm_ik_service.exports.posture import Joint, Posture, in_parent, posture_of
 from arm_ik_service.geometry import scalar as g
 from arm_ik_service.wire.messages import ArmsState, ControllerFrame, Side, TrackedPose
 
-PORT = 39539
 LOWER_ARM_TWIST = 0.5  # of the pronation, as Unity spreads it by default; the rest is the hand's
 CALIBRATED, NORMAL_MODE = 3, 0
 

@@ -12,7 +12,6 @@ from arm_ik_service.exports.osc import Message
 from arm_ik_service.exports.posture import Joint, posture_of
 from arm_ik_service.wire.messages import ArmsState
 
-PORT = 9000
 LEFT_ELBOW, RIGHT_ELBOW, CHEST = "1", "2", "3"
 
 

@@ -1,10 +1,12 @@
 """Sending live states on in another dialect, in a process of its own: no sink can delay the service.
 
-Between Zenoh's thread and the sink lies one slot an avatar: a sink that is slow gets the newest state, not a queue.
+The process gives way to others where processors are scarce, and between Zenoh's thread and the sink lies one slot an
+avatar: a sink that is slow gets the newest state, not a queue.
 """
 
 from __future__ import annotations
 
+import os
 import time
 from collections import deque
 from dataclasses import dataclass
@@ -19,6 +21,15 @@ from arm_ik_service.wire.keys import Keys
 from arm_ik_service.wire.messages import ArmsState, ControllerFrame
 
 REMEMBERED = 32  # frames of an avatar that may wait for their answer
+
+
+NICENESS = 10  # halfway to the least: a service and its clients are scheduled first
+
+
+def give_way() -> None:
+    """Lower the priority of this process, where the system knows such a thing."""
+    if hasattr(os, "nice"):
+        os.nice(NICENESS)
 
 
 @dataclass
@@ -53,10 +64,9 @@ class Exporter:
         self._changed = Condition()
         self._stopped = False
         self._exported = Exported()
-        self._subscribers = [
-            subscribe(bus, keys.arms(avatar or "*"), self._take_arms),
-            subscribe(bus, keys.controllers(avatar or "*"), self._take_frame),
-        ]
+        self._subscribers = [subscribe(bus, keys.arms(avatar or "*"), self._take_arms)]
+        if sink.wants_frames:  # each subscriber costs the service's process a copy of the stream
+            self._subscribers.append(subscribe(bus, keys.controllers(avatar or "*"), self._take_frame))
 
     def stop(self) -> None:
         """Make `run` return; safe in a signal handler."""

@@ -5,8 +5,9 @@ from __future__ import annotations
 import time
 from typing import Any, Protocol
 
-from arm_ik_service.exports import body_tracking
+from arm_ik_service.exports import body_tracking, vmc, vrchat
 from arm_ik_service.exports.extras import optional_libraries
+from arm_ik_service.exports.osc import OscTarget
 from arm_ik_service.io.zenoh_streams import Bus, Stream, announce, declare_stream
 from arm_ik_service.wire.messages import ArmsState, ControllerFrame
 
@@ -15,9 +16,10 @@ class Sink(Protocol):
     """Takes the newest states of one avatar or of all."""
 
     many: bool  # whether it can tell several people apart
+    wants_frames: bool  # whether `frame` is of use to it
 
     def send(self, state: ArmsState, frame: ControllerFrame | None) -> None:
-        """Send one state; `frame` is the one it answers, if that was heard. Never raises, never waits."""
+        """Send one state; `frame` is the one it answers, if wanted and heard. Never raises, never waits."""
 
     def close(self) -> None:
         """Let go of what it holds."""
@@ -27,12 +29,10 @@ class VmcSink:
     """VMC over OSC."""
 
     many = False
+    wants_frames = True
 
-    def __init__(self, host: str, port: int, lower_arm_twist: float | None = None) -> None:
-        with optional_libraries():
-            from arm_ik_service.exports import vmc
-            from arm_ik_service.exports.osc import OscTarget
-        self._vmc = vmc.Vmc(vmc.LOWER_ARM_TWIST if lower_arm_twist is None else lower_arm_twist)
+    def __init__(self, host: str, port: int, lower_arm_twist: float = vmc.LOWER_ARM_TWIST) -> None:
+        self._vmc = vmc.Vmc(lower_arm_twist)
         self._target = OscTarget(host, port)
 
     def send(self, state: ArmsState, frame: ControllerFrame | None) -> None:
@@ -49,17 +49,15 @@ class VrChatSink:
     """VRChat's OSC trackers."""
 
     many = False
+    wants_frames = False
 
     def __init__(self, host: str, port: int, *, chest: bool = False) -> None:
-        with optional_libraries():
-            from arm_ik_service.exports import vrchat
-            from arm_ik_service.exports.osc import OscTarget
-        self._vrchat, self._chest = vrchat, chest
+        self._chest = chest
         self._target = OscTarget(host, port)
 
     def send(self, state: ArmsState, frame: ControllerFrame | None) -> None:
         """Send one packet."""
-        self._target.send(self._vrchat.messages(state, chest=self._chest))
+        self._target.send(vrchat.messages(state, chest=self._chest))
 
     def close(self) -> None:
         """Let go of the socket."""
@@ -73,6 +71,7 @@ class Ros2Sink:
     """
 
     many = True
+    wants_frames = False
 
     def __init__(self, bus: Bus, *, domain: int = 0, rmw_zenoh: bool = True, bridge: bool = True) -> None:
         with optional_libraries():
@@ -125,6 +124,7 @@ class BodyTrackingSink:
     """XR_FB_body_tracking's joints as JSON on Zenoh."""
 
     many = True
+    wants_frames = False
 
     def __init__(self, bus: Bus, prefix: str = "") -> None:
         self._bus, self._prefix = bus, prefix

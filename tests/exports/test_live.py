@@ -200,6 +200,7 @@ def test_several_people_are_not_mixed_on_a_sink_that_knows_one(hub: tuple[Bus, s
 
     class OnePerson:
         many = False
+        wants_frames = False
 
         def send(self, state: ArmsState, frame: ControllerFrame | None) -> None:
             heard.append(state.avatar)

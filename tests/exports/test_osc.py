@@ -71,7 +71,7 @@ class Receiver:
         self.devices: dict[str, Array] = {}
         self.others: dict[str, list[Any]] = {}
         for messages in Vmc(twist).packets(state, frame_of(state)):
-            assert bundle(messages).size < 1472  # an Ethernet frame less IP and UDP headers
+            assert len(bundle(messages)) < 1472  # an Ethernet frame less IP and UDP headers
             for address, params in received(messages):
                 if address in ("/VMC/Ext/Bone/Pos", "/VMC/Ext/Root/Pos"):
                     self.bones[params[0]] = (np.array(params[1:4]), unity_matrix(params[4:8]))
