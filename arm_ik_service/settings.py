@@ -21,7 +21,8 @@ from arm_ik_service.wire.messages import Encoding
 class TrackingSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """One device in time."""
 
-    # what to do with poses that are valid but not tracked (dead-reckoned), and with none at all
+    # what to do with a hand whose pose is valid but not tracked (dead-reckoned): `freeze` holds it on the person as
+    # where there is no pose at all, `follow` believes the guess, `fade_to_rest` lowers the arm once it is lost
     dead_reckoning: Literal["freeze", "follow", "fade_to_rest"] = "freeze"
     lost_after_s: Annotated[float, Meta(ge=0.0)] = 1.0  # without good data a device is held, after this long it is lost
     reacquire_m_s: Annotated[float, Meta(gt=0.0)] = 14.0  # speed of the way back to good data, added to the data's own:

@@ -1,4 +1,8 @@
-"""Hands that nobody knows anything of: where they hang, and how a lost one gets there."""
+"""Hands without data: they go along with the person, or hang at rest.
+
+A hand that is held is held on the person, not in the room: one that stayed behind while its owner walks or turns would
+end up behind the back or through the chest. The person's heading is that of the head less what the neck turns.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +16,25 @@ from arm_ik_service.tracking.state import HANDS_AT_REST, LOST, NEVER_S
 FADE_TO_REST = 2  # of TrackingSettings.dead_reckoning
 FADES_FOR_S = 0.4  # time constant of the way to rest ...
 FASTEST_M_S, FASTEST_RAD_S = 1.0, 3.0  # ... and its bounds
+
+NECK_TURNS_RAD = 0.6  # a glance within this leaves the body, and with it a held hand, where it is
+BODY_FOLLOWS_S = 1.5  # nobody looks aside for ever: time constant with which the body comes after the head
+
+
+@compiled
+def turn_person(tracking: Record, elapsed_s: float) -> float:
+    """Update the person's heading after the head; how far it turned [rad], about +Y."""
+    ahead = g.heading(g.quaternion(tracking.head.rotation))
+    yaw = math.atan2(-ahead[0], -ahead[2])
+    if tracking.has_heading == 0:
+        tracking.has_heading, tracking.heading = 1, yaw
+        return 0.0
+    heading = g.wrap(tracking.heading + tracking.recentred_yaw)  # what is held was moved along by the recentre itself
+    aside = g.wrap(yaw - heading)
+    glance = g.clip(aside, -NECK_TURNS_RAD, NECK_TURNS_RAD)
+    turn = aside - glance + glance * (1.0 - math.exp(-elapsed_s / BODY_FOLLOWS_S))
+    tracking.heading = g.wrap(heading + turn)
+    return turn
 
 
 @compiled
@@ -37,21 +60,29 @@ def _approach_rotation(device: Record, goal: Quaternion, elapsed_s: float) -> No
 
 
 @compiled
-def place_lost_hand(tracking: Record, k: int, head_moved: Vector, elapsed_s: float, dead_reckoning: int) -> None:
-    """Move a hand that is lost: with the head, or to rest; one never seen hangs at rest from the start."""
-    hand, head = tracking.hands[k], tracking.head
-    ahead = g.heading(g.quaternion(head.rotation))
-    upright = g.rotation_y(math.atan2(-ahead[0], -ahead[2]))
-    rest = g.add(g.vector(head.position), g.rotate(upright, HANDS_AT_REST[k]))
-    if hand.position_state == LOST:
-        if hand.position_age_s >= NEVER_S:
-            g.store(hand.position, rest)
-        elif dead_reckoning == FADE_TO_REST:
+def _carry_position(hand: Record, head_before: Vector, head: Vector, turn: Quaternion) -> None:
+    away = g.rotate(turn, g.subtract(g.vector(hand.position), head_before))
+    g.store(hand.position, g.add(head, away))
+
+
+@compiled
+def place_hand_without_data(
+    tracking: Record, k: int, head_before: Vector, turned: float, elapsed_s: float, dead_reckoning: int
+) -> None:
+    """Move what is not followed of one hand after a person whose head was at `head_before` and who `turned` [rad]."""
+    hand, head = tracking.hands[k], g.vector(tracking.head.position)
+    turn, upright = g.rotation_y(turned), g.rotation_y(tracking.heading)
+    rest = g.add(head, g.rotate(upright, HANDS_AT_REST[k]))
+    fades = dead_reckoning == FADE_TO_REST
+    if hand.position_age_s >= NEVER_S:
+        g.store(hand.position, rest)
+    elif hand.position_age_s > 0.0:
+        _carry_position(hand, head_before, head, turn)
+        if fades and hand.position_state == LOST:
             _approach_position(hand, rest, elapsed_s)
-        else:
-            g.store(hand.position, g.add(g.vector(hand.position), head_moved))
-    if hand.rotation_state == LOST:
-        if hand.rotation_age_s >= NEVER_S:
-            g.store(hand.rotation, upright)
-        elif dead_reckoning == FADE_TO_REST:
+    if hand.rotation_age_s >= NEVER_S:
+        g.store(hand.rotation, upright)
+    elif hand.rotation_age_s > 0.0:
+        g.store(hand.rotation, g.normalized(g.multiply(turn, g.quaternion(hand.rotation))))
+        if fades and hand.rotation_state == LOST:
             _approach_rotation(hand, upright, elapsed_s)

@@ -72,6 +72,8 @@ TRACKING = record_dtype(
         ("dt_s", np.float64),  # since the frame before; 0 for the first, for a repeated time, after a clock step
         ("interval_s", np.float64),  # to divide movements by: dt_s, but never so little that noise looks like speed
         ("clock", CLOCK),
+        ("has_heading", np.int64),
+        ("heading", np.float64),  # of the person, not of a glance; about +Y
         ("recentres", np.int64),  # how often the tracked space was found to have been moved
         ("recentred_yaw", np.float64),  # by how much in this frame, about +Y
     ]

@@ -11,7 +11,7 @@ from arm_ik_service.geometry import scalar as g
 from arm_ik_service.tracking.clock import step_clock
 from arm_ik_service.tracking.device import step_device
 from arm_ik_service.tracking.recentre import follow_recentre
-from arm_ik_service.tracking.rest import place_lost_hand
+from arm_ik_service.tracking.rest import place_hand_without_data, turn_person
 from arm_ik_service.tracking.state import (
     ACCEPTED,
     HANDS_AT_REST,
@@ -54,10 +54,10 @@ def step_tracking(tracking: Record, frame: Record, now_ns: int, settings: Record
         return verdict
     elapsed_s, period_s = tracking.interval_s, tracking.clock.period_s
     follow_recentre(tracking, frame, elapsed_s)
-    head = g.vector(tracking.head.position)
+    head_before = g.vector(tracking.head.position)
     step_device(tracking.head, frame.head, elapsed_s, period_s, settings)
-    head_moved = g.subtract(g.vector(tracking.head.position), head)
+    turned = turn_person(tracking, elapsed_s)
     for k in range(2):
         step_device(tracking.hands[k], frame.hands[k], elapsed_s, period_s, settings)
-        place_lost_hand(tracking, k, head_moved, elapsed_s, settings.dead_reckoning)
+        place_hand_without_data(tracking, k, head_before, turned, elapsed_s, settings.dead_reckoning)
     return ACCEPTED

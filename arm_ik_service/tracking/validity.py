@@ -27,6 +27,8 @@ def _position_is_plausible(position: Any) -> bool:
 @compiled
 def _rotation_is_plausible(rotation: Any) -> bool:
     x, y, z, w = rotation[0], rotation[1], rotation[2], rotation[3]
+    if not (abs(x) < 2.0 and abs(y) < 2.0 and abs(z) < 2.0 and abs(w) < 2.0):
+        return False
     return bool(abs(math.sqrt(x * x + y * y + z * z + w * w) - 1.0) <= NORM_TOLERANCE)
 
 

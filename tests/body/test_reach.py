@@ -22,8 +22,15 @@ def test_no_more_is_granted_than_asked_for_nor_than_there_is(ratio: float, edge:
 
 
 @given(st.floats(0.5, 1.3), st.floats(1e-4, 0.2), edges)
-def test_reaching_farther_moves_the_hand_farther(ratio: float, more: float, edge: float) -> None:
-    assert soft_reach(ratio + more, edge) > soft_reach(ratio, edge)
+def test_reaching_farther_never_takes_the_hand_back(ratio: float, more: float, edge: float) -> None:
+    assert soft_reach(ratio + more, edge) >= soft_reach(ratio, edge)
+
+
+@given(st.floats(-1.0, 8.0), edges)
+def test_around_full_reach_the_hand_never_freezes(beyond: float, edge: float) -> None:
+    room = FULLY_STRETCHED - edge
+    ratio = edge + beyond * room
+    assert soft_reach(ratio + 0.01 * room, edge) > soft_reach(ratio, edge)
 
 
 @given(edges)

@@ -114,8 +114,22 @@ def test_hands_never_seen_hang_by_the_head_wherever_it_goes() -> None:
     assert made.position(RIGHT)[0, 0] > made.position(LEFT)[0, 0]
 
 
-def test_a_lost_hand_goes_with_the_person() -> None:
+def test_a_hand_that_is_held_goes_along_when_the_person_walks() -> None:
     take = standing(3.0).flagged(LEFT, slice(45, None), 0)
-    take = take.moved(HEAD, stroke(take.t, 2.0, 0.9, [1.5, 0.0, 0.0]))
+    take = take.moved(HEAD, stroke(take.t, 1.0, 0.9, [1.5, 0.0, 0.0]))
     made = run(take.frames)
-    assert made.position(LEFT)[-1, 0] - take.poses[44, LEFT, 0] == pytest.approx(1.5, abs=0.02)
+    assert made.position(LEFT)[-1] - take.poses[44, LEFT, :3] == pytest.approx([1.5, 0.0, 0.0], abs=0.02)
+
+
+def test_a_hand_that_is_held_goes_round_with_a_person_who_turns_but_not_with_a_glance() -> None:
+    take = standing(1.5).flagged(LEFT, slice(45, None), 0)
+    about = stroke(take.t, 0.6, 0.4, [0.0, 1.0, 0.0])
+    held = take.poses[44, LEFT, :3] - take.poses[44, HEAD, :3]
+
+    def yaw_of_hand(turn: float) -> float:
+        made = run(take.turned(HEAD, batch.exp(turn * about)).frames)
+        x, _, z = (made.position(LEFT) - made.position(HEAD))[-1]
+        return float(np.arctan2(x, z) - np.arctan2(held[0], held[2])) % (2.0 * np.pi)
+
+    assert yaw_of_hand(0.5) < 0.25
+    assert yaw_of_hand(3.0) == pytest.approx(2.6, abs=0.3)
