@@ -18,6 +18,7 @@ from arm_ik_service.ik.velocity import difference
 from arm_ik_service.settings import SolverSettings, to_record
 
 Array = npt.NDArray[np.float64]
+Counts = npt.NDArray[np.int64]
 
 
 def random_stream(
@@ -54,10 +55,10 @@ class Run:
     velocity: Array
     position_error_m: Array
     orientation_error_rad: Array
-    iterations: npt.NDArray[np.int64]
-    limits: npt.NDArray[np.int64]
-    status: npt.NDArray[np.int64]
-    restarted: npt.NDArray[np.int64]
+    iterations: Counts
+    limits: Counts
+    status: Counts
+    restarted: Counts
     elbow: Array
     confidence: Array
 
@@ -75,12 +76,16 @@ def targets_of(hands: Array, dt_s: float) -> npt.NDArray[Any]:
 def run(arm: ArmModel, targets: npt.NDArray[Any], dt_s: float, settings: SolverSettings | None = None) -> Run:
     """Step a fresh arm along TARGET records."""
     n = len(targets)
+    iterations, limits, status, restarted = (np.empty(n, np.int64) for _ in range(4))
     answer = Run(
         np.empty((n, 10)),
         np.empty((n, 9)),
         np.empty(n),
         np.empty(n),
-        *(np.empty(n, np.int64) for _ in range(4)),
+        iterations,
+        limits,
+        status,
+        restarted,
         np.empty((n, 3)),
         np.empty(n),
     )

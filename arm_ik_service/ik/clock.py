@@ -10,7 +10,7 @@ import time
 from typing import Any
 
 import numba
-from llvmlite import ir
+from llvmlite import ir  # type: ignore[import-untyped]
 from numba.core import cgutils, types
 from numba.extending import intrinsic
 
@@ -49,7 +49,7 @@ def _query_performance_counter(typing_context: Any) -> Any:
     return types.int64(), generate
 
 
-if numba.config.DISABLE_JIT:
+if numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
 
     def monotonic_ns() -> int:
         """Return nanoseconds of the monotonic clock."""
@@ -58,7 +58,7 @@ if numba.config.DISABLE_JIT:
 else:
     _read = _query_performance_counter if sys.platform == "win32" else _clock_gettime
 
-    @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+    @numba.njit(cache=True, nogil=True)
     def monotonic_ns() -> int:
         """Return nanoseconds of the monotonic clock."""
-        return _read()
+        return int(_read())  # type: ignore[call-arg]

@@ -59,7 +59,7 @@ def discomfort(comfort: Any, habit: Any, chain: Record, posture: Posture) -> flo
     p = pronation - comfort[0]
     f, d = (flexion - HABIT_SHARE * habit[0]) / WRIST_SCALE, (deviation - HABIT_SHARE * habit[1]) / WRIST_SCALE
     t = twist_of(upper_arm) - comfort[5] + comfort[6] * y[0] + comfort[7] * y[1] + comfort[8] * y[2]
-    return (
+    total: float = (
         comfort[1] * p * p
         + WRIST_SCALE * WRIST_SCALE * (comfort[2] * math.log(1.0 + f * f) + comfort[3] * math.log(1.0 + d * d))
         + comfort[4] * t * t
@@ -67,6 +67,7 @@ def discomfort(comfort: Any, habit: Any, chain: Record, posture: Posture) -> flo
         + comfort[10] * y[2]
         + LIMIT_WEIGHT * violation(chain, posture, LIMIT_MARGIN)
     )
+    return total
 
 
 @compiled

@@ -18,10 +18,10 @@ from arm_ik_service.arm.chain import (
 from arm_ik_service.arm.limits import swing_excess, twist_excess, twist_of
 from arm_ik_service.compiled import Record, compiled
 from arm_ik_service.geometry.scalar import clip, quaternion, scale, store, vector
-from arm_ik_service.ik.conjugate import AT_LIMIT, move
+from arm_ik_service.ik.conjugate import AT_LIMIT, SOLVED, move
 from arm_ik_service.ik.frame_step import first_frame, step_frame
 from arm_ik_service.ik.state import ARM, initialise_arm
-from arm_ik_service.ik.velocity import SPEED_BIT, difference, velocity_from_twist
+from arm_ik_service.ik.velocity import ITERATIONS, SPEED_BIT, difference, velocity_from_twist
 
 MIN_DT_S, MAX_DT_S = 1e-3, 0.1  # a frame's time outside this says nothing about speed
 
@@ -52,19 +52,23 @@ def step_arm(arm: Record, target: Record, dt_s: float, settings: Record) -> None
 def _move_on(arm: Record, settings: Record, linear: Any, angular: Any, dt_s: float) -> None:
     """Find the joint velocity: recent motion carried on, corrected by the hand's twist, scaled to speed limits."""
     chain, velocity, recent, step = arm.chain, arm.velocity, arm.recent_velocity, arm.work.direction
+    follows = arm.status == SOLVED  # a hand that limits hold back does not move as it is asked to
     if arm.started == 0 or arm.restarted == 1:  # a jump is no motion
         for i in range(9):
             velocity[i] = 0.0
         arm.started = 1
     else:
         difference(arm.before, arm.configuration, dt_s, step)
-        # the mean over the last frame is half a frame old
+        # The mean over the last frame is half a frame old: carry it on. Where the hand is held back, calm it.
+        onward = 0.0 if arm.started == 1 else (0.5 if follows else -0.5)
         for i in range(9):
-            velocity[i] = step[i] + (0.5 * (step[i] - recent[i]) if arm.started == 2 else 0.0)
+            velocity[i] = step[i] + onward * (step[i] - recent[i])
             recent[i] = step[i]
         arm.started = 2
     lam = settings.rotation_weight_m * settings.rotation_weight_m
-    velocity_from_twist(chain, arm.work, arm.configuration, linear, angular, lam, velocity)
+    velocity_from_twist(
+        chain, arm.work, arm.configuration, linear, angular, lam, ITERATIONS if follows else 0, velocity
+    )
     share = 1.0
     for i in range(9):
         share = min(share, chain.speed_limit[i] / max(abs(velocity[i]), 1e-9))

@@ -28,7 +28,7 @@ from arm_ik_service.geometry.scalar import (
 )
 from arm_ik_service.ik.conjugate import MOBILITY, combine, hold_limits, independent, project
 
-_ITERATIONS = 8  # six would do in exact arithmetic: the hand's twist has six numbers
+ITERATIONS = 8  # six would do in exact arithmetic: the hand's twist has six numbers
 _DAMPING = 1e-4  # of the squared scaled columns (which are about one): 0.01 % bias away from singularities
 _ENOUGH = 1e-10  # squared relative residual
 SPEED_BIT = 256  # place of `joint_speed` in arm.model.LIMITS
@@ -60,11 +60,19 @@ def _lock(vector: Any, inverse: Any, swing: Vector, twist: Vector, locked: int) 
 
 @compiled
 def velocity_from_twist(
-    chain: Record, work: Record, configuration: Any, linear: Vector, angular: Vector, lam: float, velocity: Any
+    chain: Record,
+    work: Record,
+    configuration: Any,
+    linear: Vector,
+    angular: Vector,
+    lam: float,
+    iterations: int,
+    velocity: Any,
 ) -> int:
     """Correct `velocity` (9,) in place so that it gives the wrist its twist (right arm, ISB axes); return held limits.
 
-    On the way in `velocity` is the recent motion; it is the answer wherever the twist leaves it free.
+    On the way in `velocity` is the recent motion; it is the answer wherever the twist leaves it free. With no
+    `iterations` it is all of the answer, less what moves out of limits.
     """
     base = columns_of((configuration[0], configuration[1], configuration[2], configuration[3]))
     x1, y1, lower = turn_group(base, configuration[4], configuration[5], configuration[6])
@@ -93,7 +101,7 @@ def velocity_from_twist(
             velocity[i] = prior[i]
         _lock(velocity, inverse, swing, twist, locked)
         slope_before, first = 0.0, 0.0
-        for k in range(_ITERATIONS):
+        for k in range(iterations):
             spin0 = combine(velocity[0], base[0], velocity[1], base[1], velocity[2], base[2])
             spin1 = combine(velocity[3], base[2], velocity[4], x1, velocity[5], y1)
             spin2 = combine(velocity[6], lower[2], velocity[7], x2, velocity[8], y2)

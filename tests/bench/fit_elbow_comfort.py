@@ -150,7 +150,7 @@ def main() -> None:
             comfort = constants(z)
             errors = [0.5 * (a.error_m(comfort) + a.error_m(comfort, t)) for a, t in zip(fitted, turned, strict=True)]
             by_person = per_group(fitted, errors, lambda one: one.person)
-            return 100.0 * float(np.mean(list(by_person.values()))) + arguments.ridge * float(z @ z)
+            return 100.0 * float(np.mean(list(by_person.values()))) + float(arguments.ridge) * float(z @ z)
 
         answers.append(minimise(loss, len(FIRST), arguments.generations, rng))
         print(f"draw {draw}: {loss(answers[-1]):.3f} cm")

@@ -18,7 +18,7 @@ from arm_ik_service.ik.conjugate import WORK, converge, rotation_error
 from arm_ik_service.ik.jacobian_transpose import JacobianTranspose
 from arm_ik_service.ik.reference import PinocchioReference
 from arm_ik_service.ik.solver import Status
-from arm_ik_service.ik.velocity import velocity_from_twist
+from arm_ik_service.ik.velocity import ITERATIONS, velocity_from_twist
 
 Array = npt.NDArray[np.float64]
 ARMS = {side: ArmModel.load(side) for side in ("left", "right")}
@@ -156,7 +156,7 @@ def test_velocity_gives_the_hand_its_twist_and_is_the_jacobians() -> None:
         twist = rng.normal(size=6)
         v = rng.normal(size=9)
         linear, angular = (position_to_arm(chain, tuple(part)) for part in (twist[:3], twist[3:]))
-        held = velocity_from_twist(chain, works[0], q, linear, angular, LAM, v)
+        held = velocity_from_twist(chain, works[0], q, linear, angular, LAM, ITERATIONS, v)
         assert held == 0
         jacobian = pin.computeFrameJacobian(
             RIGHT.pinocchio, data, q, RIGHT.hand_frame_id, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED

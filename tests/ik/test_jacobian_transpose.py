@@ -29,7 +29,7 @@ def hand_at(position: list[float], fingers: list[float], back: list[float]) -> A
 
 
 def elbow_steps(arm: ArmModel, q: Array) -> Array:
-    return np.linalg.norm(np.diff(arm.forward(q)["elbow"][:, :3], axis=0), axis=1)
+    return np.asarray(np.linalg.norm(np.diff(arm.forward(q)["elbow"][:, :3], axis=0), axis=1))
 
 
 @pytest.mark.parametrize("side", ["left", "right"])

@@ -16,6 +16,7 @@ from arm_ik_service.geometry import batch
 from arm_ik_service.ik.state import new_arm
 from arm_ik_service.ik.step import predict, step_arm
 from arm_ik_service.settings import SolverSettings, to_record
+from arm_ik_service.wire.messages import SIDES
 
 RIGHT = ArmModel.load()
 DT_S = 1.0 / 90.0
@@ -28,7 +29,7 @@ def smooth_stream(seed: int, arm: ArmModel = RIGHT) -> Array:
 
 
 def rms(values: Array) -> Array:
-    return np.sqrt(np.mean(values**2, axis=0))
+    return np.asarray(np.sqrt(np.mean(values**2, axis=0)))
 
 
 @pytest.mark.parametrize("side", ["left", "right"])
@@ -44,15 +45,17 @@ def test_velocity_is_the_derivative_of_the_configuration_on_smooth_motion(side: 
 
 
 def test_velocity_has_no_spikes_at_limits() -> None:
-    for seed in range(3):
-        answer = run(RIGHT, targets_of(random_stream(RIGHT, seed, most_m_s=2.0)[1], DT_S), DT_S)
+    checked = 0
+    for seed in range(4):
+        answer = run(RIGHT, targets_of(random_stream(RIGHT, seed, most_m_s=3.0)[1], DT_S), DT_S)
         truth = central_differences(answer.configuration, DT_S)
-        calm = np.convolve(answer.restarted, np.ones(5), "same") == 0
         near = np.array([np.nanmax(np.abs(truth[max(0, n - 3) : n + 4]), axis=0) for n in range(len(truth))])
-        at_limit = (answer.limits & 0xFF) != 0
-        chosen = calm & at_limit & (np.arange(len(truth)) > 30)
-        assert chosen.sum() > 20
+        calm = np.convolve(answer.restarted, np.ones(9), "same") == 0
+        chosen = calm & ((answer.limits & 0xFF) != 0) & (np.arange(len(truth)) > 30)
+        checked += int(chosen.sum())
+        # half a radian a second is the noise of a joint that hardly moves
         assert (np.abs(answer.velocity[chosen]) <= 1.5 * near[chosen] + 0.5).all()
+    assert checked > 50
 
 
 def test_joints_at_a_limit_do_not_move_outward() -> None:
@@ -94,8 +97,8 @@ def test_prediction_lands_where_the_hand_will_be() -> None:
 
 
 def test_bones_are_the_forward_kinematics_of_the_configuration() -> None:
-    for side in ("left", "right"):
-        arm = ArmModel.load(side)  # type: ignore[arg-type]
+    for side in SIDES:
+        arm = ArmModel.load(side)
         arms = new_arm(arm)
         for target in targets_of(smooth_stream(3, arm), DT_S)[:20]:
             step_arm(arms[0], target, DT_S, SETTINGS)
@@ -158,6 +161,7 @@ from arm_ik_service.arm.model import ArmModel
 from arm_ik_service.ik.state import new_arm
 from arm_ik_service.ik.step import step_arm
 from arm_ik_service.settings import SolverSettings, to_record
+from arm_ik_service.wire.messages import SIDES
 from streams import random_stream, targets_of
 arm = ArmModel.load()
 arms, settings = new_arm(arm), to_record(SolverSettings())
