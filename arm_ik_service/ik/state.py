@@ -19,7 +19,7 @@ ARM = record_dtype(
         ("comfort", np.float64, (len(COMFORT),)),
         ("work", WORK),
         # memory
-        ("started", np.int64),  # frames since the arm was at rest: 0, 1 or 2
+        ("started", np.int64),  # 0: no frame yet; 1: one; 2: two on end with the hand met, without a jump
         ("before", np.float64, (10,)),  # configuration one frame ago
         ("recent_velocity", np.float64, (9,)),  # mean over the last frame
         ("habit", np.float64, (2,)),  # usual wrist flexion and deviation [rad]

@@ -60,11 +60,11 @@ def _move_on(arm: Record, settings: Record, linear: Any, angular: Any, dt_s: flo
     else:
         difference(arm.before, arm.configuration, dt_s, step)
         # The mean over the last frame is half a frame old: carry it on. Where the hand is held back, calm it.
-        onward = 0.0 if arm.started == 1 else (0.5 if follows else -0.5)
+        onward = (0.5 if arm.started == 2 else 0.0) if follows else -0.5
         for i in range(9):
             velocity[i] = step[i] + onward * (step[i] - recent[i])
             recent[i] = step[i]
-        arm.started = 2
+        arm.started = 2 if follows else 1
     lam = settings.rotation_weight_m * settings.rotation_weight_m
     velocity_from_twist(
         chain, arm.work, arm.configuration, linear, angular, lam, ITERATIONS if follows else 0, velocity
