@@ -16,6 +16,7 @@ from arm_ik_service.cli.certificates import certificates
 from arm_ik_service.cli.convert import convert
 from arm_ik_service.cli.demo import demo
 from arm_ik_service.cli.export import export
+from arm_ik_service.cli.grab import grab
 from arm_ik_service.cli.record import record
 from arm_ik_service.cli.replay import replay
 from arm_ik_service.cli.router import router
@@ -33,7 +34,7 @@ app = typer.Typer(
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (demo, serve, replay, record, view, solve, convert, export, schema, router, certificates):
+for command in (demo, serve, replay, record, view, solve, convert, export, schema, router, certificates, grab):
     app.command()(command)
 app.add_typer(bench)
 app.add_typer(bridge, name="bridge")

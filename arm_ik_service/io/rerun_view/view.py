@@ -15,6 +15,7 @@ import rerun as rr
 from arm_ik_service.errors import ViewError
 from arm_ik_service.io.rerun_view.blueprint import blueprint_of
 from arm_ik_service.io.rerun_view.entities import Sender, entity_of, log_name, log_styles, skeleton_of
+from arm_ik_service.io.rerun_view.props import Box
 from arm_ik_service.io.rerun_view.rows import Rows
 from arm_ik_service.io.rerun_view.sinks import Save, Sink, attach, first_line
 from arm_ik_service.io.rerun_view.skinned import Skin
@@ -65,6 +66,7 @@ class RerunView:
         self._spacing_m = spacing_m
         self._skin = skin
         self._people: dict[str, _Person] = {}
+        self._boxes: list[Box] = []
         self._described: dict[str, tuple[Skeleton, Mapping[Side, Pose]]] = {}
         if name:
             self._recording.send_recording_name(name)
@@ -88,10 +90,17 @@ class RerunView:
         if len(person.rows) >= BATCH_ROWS:
             self._send(person)
 
+    def box(self, name: str, edge_m: float) -> Box:
+        """Put a cube beside the people; it is moved by what is added to it."""
+        self._boxes.append(Box(self._recording, name, edge_m))
+        return self._boxes[-1]
+
     def flush(self) -> None:
         """Send what was gathered. Does not wait for the viewer; what it has not taken yet waits in memory."""
         for person in self._people.values():
             self._send(person)
+        for box in self._boxes:
+            box.flush()
 
     def settled(self, timeout_s: float) -> bool:
         """Wait until the file or the viewer has taken everything that was sent, or the time is over.
