@@ -19,7 +19,7 @@ from arm_ik_service.cli.options import (
     say,
     stopped_by_signals,
 )
-from arm_ik_service.wire.messages import Encoding
+from arm_ik_service.wire.messages import Encoding, Space
 
 bridge = typer.Typer(help="Publish controller frames live from a headset.", no_args_is_help=True)
 
@@ -105,3 +105,67 @@ def web(
         )
         asyncio.run(serve())
         say(web_bridge.farewell())
+
+
+@bridge.command()
+def openxr(
+    avatar: Annotated[str, typer.Option(help="Avatar id to publish under.")] = "openxr",
+    rate_hz: Annotated[
+        float, typer.Option("--rate", metavar="HZ", min=1.0, max=1000.0, help="Frames a second.")
+    ] = 90.0,
+    space: Annotated[
+        Space | None, typer.Option(help="Space of the poses; default: the first of these that the runtime has.")
+    ] = None,
+    frozen_after_s: Annotated[
+        float,
+        typer.Option(
+            "--frozen-after",
+            metavar="SECONDS",
+            min=0.0,
+            help="A pose unchanged to the bit for so long is called inferred, not tracked; 0 never.",
+        ),
+    ] = 0.5,
+    probe: Annotated[
+        bool, typer.Option("--probe", help="Show the runtime and a few seconds of poses; publish nothing.")
+    ] = False,
+    probe_s: Annotated[float, typer.Option("--probe-for", metavar="SECONDS", min=0.0, help="How long to show.")] = 3.0,
+    encoding: Annotated[Encoding, typer.Option(help="How the frames are encoded.")] = "msgpack",
+    prefix: Annotated[str, typer.Option(help="Key prefix, as in the service's settings.")] = "",
+    connect: Connect = None,
+    listen: Listen = None,
+    scouting: Scouting = False,
+    zenoh_config: ZenohConfig = None,
+) -> None:
+    """Publish head and grips of the installed OpenXR runtime (Monado, SteamVR) from a session without a window.
+
+    A runtime that dies is waited for, and its controllers are lost meanwhile. Where no controller is held, tracked
+    hands are used if the runtime tracks them.
+
+    Example: [bold]arm-ik bridge openxr --rate 120 --space stage[/bold]
+    """
+    from threading import Event
+
+    from arm_ik_service.bridges.frames import FramePublisher
+    from arm_ik_service.bridges.openxr import bridge as loop
+    from arm_ik_service.bridges.openxr.pyopenxr import PyOpenXr, load_xr
+    from arm_ik_service.io.zenoh_bus import open_client
+    from arm_ik_service.wire.keys import Keys, check_id
+
+    check_id(avatar)
+    runtime = PyOpenXr(load_xr())
+    if probe:
+        stopped = Event()
+        with stopped_by_signals(stopped.set):
+            loop.probe(runtime, space=space, seconds=probe_s, show=typer.echo, stopped=stopped)
+        return
+    runtime.create(space)  # what no waiting mends is said before the bus is waited for
+    runtime.destroy()
+    with open_client(bus_options(connect, listen, scouting, zenoh_config), waiting=say) as bus:
+        publisher = FramePublisher(bus, Keys(prefix), avatar, encoding)
+        running = loop.OpenXrBridge(
+            runtime, publisher, rate_hz=rate_hz, space=space, frozen_after_s=frozen_after_s, say=say
+        )
+        with stopped_by_signals(running.stop):
+            say(f"ready: {avatar} at {rate_hz:g} Hz; Ctrl-C ends it")
+            running.run(lambda found: say(f"{found.runtime} {found.version}: {found.system}, {found.space} space"))
+        say(f"published {publisher.published} frames")

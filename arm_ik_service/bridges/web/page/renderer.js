@@ -136,7 +136,7 @@ export class Renderer {
     gl.stencilOp(gl.KEEP, gl.KEEP, gl.INCR);
     gl.uniformMatrix4fv(program.clipFromWorld, false, clipFromWorld);
     gl.uniform3fv(program.sun, SUN);
-    for (const part of parts) this.#drawMesh(program, part);
+    for (const part of parts) if (part.mesh !== "ray") this.#drawMesh(program, part);
     gl.disable(gl.STENCIL_TEST);
     gl.disable(gl.BLEND);
     gl.depthMask(true);
