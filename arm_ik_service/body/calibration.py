@@ -36,7 +36,8 @@ STANDING_PERCENTILE = 75.0  # of eye height: people crouch more than they jump
 STATURE_DEVIATION_M = {"t_pose": 0.03, "a_pose": 0.03, "moving": 0.05}  # headsets sit, and people stand, differently
 POSE_DEVIATION_M = {"t_pose": 0.015, "a_pose": 0.03}  # of an arm length: where the shoulder is enters it
 GRIP_TURNED_RAD = 1.0  # a grip farther off than wrists bend on average is held differently than assumed
-AXIS_UNKNOWN_M, AXIS_KNOWN_M = 0.15, 0.03  # where the elbow may be beside the hand's axis, before and after
+WRIST_BENT_RAD = 0.4  # what of the angle is put down to a wrist that is bent all the time
+AXIS_UNKNOWN_M, AXIS_KNOWN_M, AXIS_FOUND_M = 0.15, 0.03, 0.1  # where the elbow may be beside the hand's axis
 
 
 @dataclass(frozen=True)
@@ -146,18 +147,18 @@ def _from_pose(pose: StruckPose, observation: Observation, start: Profile) -> Ca
 
 
 def _turned_grip(start: Profile, fit: ArmFit) -> tuple[Array, float]:
-    """Grip in the wrist (4,) that puts the elbow on the hand's axis, by the shortest turn, and that turn [rad]."""
+    """Grip in the wrist (4,) that puts the elbow near the hand's axis, by the shortest turn; the angle it was off."""
     axis = fit.elbow_in_hand / fit.forearm_m
     towards = np.array([0.0, 0.0, 1.0])
     turn = np.cross(axis, towards)
     sine = float(np.linalg.norm(turn))
     angle = float(np.arctan2(sine, axis @ towards))
-    new_from_old = batch.exp(turn * (angle / sine if sine > 1e-9 else 0.0))
+    new_from_old = batch.exp(turn * (max(angle - WRIST_BENT_RAD, 0.0) / sine if sine > 1e-9 else 0.0))
     return batch.multiply(new_from_old, np.asarray(start.grip.right.orientation_xyzw)), angle
 
 
 def _from_movement(frames: np.ndarray[Any, Any], start: Profile) -> Calibration:
-    notes, profile, changed = [], start, False
+    notes, profile = [], start
     observation = observe(frames, start)
     seconds = observation.seconds
     if seconds < LEAST_MOVING_S:
@@ -170,18 +171,16 @@ def _from_movement(frames: np.ndarray[Any, Any], start: Profile) -> Calibration:
     if stature is None:
         notes.append("the head is too low for someone who stands: stature is as it was before")
         stature = start.body.stature_m
-    fit = None
-    for k in range(1 + ROUNDS):
-        fit = fit_arm(observation, stature, axis_deviation_m=AXIS_KNOWN_M if k else AXIS_UNKNOWN_M)
-        if k == 0:
-            grip, angle = _turned_grip(start, fit)
-            if changed := angle > GRIP_TURNED_RAD:
-                profile = _with_grip(start, grip)
-                notes.append(f"the controllers are held {np.degrees(angle):.0f} degrees from where OpenXR has the grip")
-        else:
-            profile = _with_measures(profile, stature, fit.upper_arm_m, fit.forearm_m)
+    fit = fit_arm(observation, stature, axis_deviation_m=AXIS_UNKNOWN_M)
+    grip, angle = _turned_grip(start, fit)
+    changed = angle > GRIP_TURNED_RAD
+    if changed:
+        profile = _with_grip(start, grip)
+        notes.append(f"the controllers are held {np.degrees(angle):.0f} degrees from where OpenXR has the grip")
+    for _ in range(ROUNDS):
         observation = observe(frames, profile)
-    assert fit is not None
+        fit = fit_arm(observation, stature, axis_deviation_m=AXIS_FOUND_M if changed else AXIS_KNOWN_M)
+        profile = _with_measures(profile, stature, fit.upper_arm_m, fit.forearm_m)
     return Calibration(
         profile=profile,
         method="moving",
