@@ -158,8 +158,7 @@ def openxr(
         with stopped_by_signals(stopped.set):
             loop.probe(runtime, space=space, seconds=probe_s, show=typer.echo, stopped=stopped)
         return
-    runtime.create(space)  # what no waiting mends is said before the bus is waited for
-    runtime.destroy()
+    loop.check(runtime, space)  # before the bus is waited for
     with open_client(bus_options(connect, listen, scouting, zenoh_config), waiting=say) as bus:
         publisher = FramePublisher(bus, Keys(prefix), avatar, encoding)
         running = loop.OpenXrBridge(

@@ -100,7 +100,7 @@ class PyOpenXr:
             system_id = xr.get_system(self._instance, xr.SystemGetInfo(xr.FormFactor.HEAD_MOUNTED_DISPLAY))
             system = xr.get_system_properties(self._instance, system_id)
             self._session = xr.create_session(self._instance, xr.SessionCreateInfo(system_id=system_id))
-            spaces = tuple(_name(kind) for kind in xr.enumerate_reference_spaces(self._session))
+            spaces = tuple(self._space_name(int(kind)) for kind in xr.enumerate_reference_spaces(self._session))
             chosen = _choose(space, spaces)
             self._base = self._reference_space(getattr(xr.ReferenceSpaceType, chosen.upper()))
             self._view = self._reference_space(xr.ReferenceSpaceType.VIEW)
@@ -126,6 +126,13 @@ class PyOpenXr:
     def _reference_space(self, kind: Any) -> Any:
         info = self._xr.ReferenceSpaceCreateInfo(kind, self._xr.Posef())
         return self._xr.create_reference_space(self._session, info)
+
+    def _space_name(self, kind: int) -> str:
+        """Name a kind of reference space; a runtime may offer kinds that this pyopenxr has not heard of."""
+        try:
+            return str(self._xr.ReferenceSpaceType(kind).name).lower()
+        except ValueError:
+            return str(kind)
 
     def _make_actions(self) -> dict[str, str]:
         """Make the grip action with its spaces; returns each suggested profile's verdict."""
@@ -312,10 +319,6 @@ def _quaternion(q: Any) -> Quaternion:
 
 def _text(value: Any) -> str:
     return value.decode(errors="replace") if isinstance(value, bytes) else str(value)
-
-
-def _name(kind: Any) -> str:
-    return str(kind.name).lower()
 
 
 def _choose(wanted: Space | None, offered: tuple[str, ...]) -> Space:
