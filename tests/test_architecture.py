@@ -42,6 +42,7 @@ OWNERS: dict[str, str | tuple[str, ...]] = {
     "foxglove": ("exports.foxglove_messages", "exports.mcap_files"),
     "pyarrow": "exports.table",
     "pygltflib": "skin.gltf",
+    "PIL": "skin.gltf",
     "typer": "cli",
     "rich": "cli",
     "numba": ("compiled", "ik.clock"),  # the clock of a solver's time limit is an LLVM intrinsic

@@ -1,25 +1,23 @@
-"""glTF 2.0, GLB and VRM files to and from skinned meshes. The only importer of pygltflib."""
+"""glTF 2.0, GLB and VRM files to skinned meshes."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from io import BytesIO
 from pathlib import Path
 from typing import Any
-from urllib.parse import unquote
 
 import numpy as np
-import numpy.typing as npt
 import pygltflib as gltf
+from PIL import Image
 
 from arm_ik_service.errors import SkinError
 from arm_ik_service.geometry import batch
+from arm_ik_service.skin.gltf_data import Array, GltfData, widened
 from arm_ik_service.skin.mesh import SKIN_COLOUR, Floats, SkinnedMesh, pack_weights, vertex_normals
 
-Array = npt.NDArray[Any]
-
-_COMPONENTS: dict[int, str] = {5120: "i1", 5121: "u1", 5122: "i2", 5123: "u2", 5125: "u4", 5126: "f4"}
-_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 _TRIANGLES = 4
+_TEXTURE_SIZE = 1024  # textures larger than that are reduced: there is one colour a vertex
 _COMPRESSED = {"KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression"}
 
 
@@ -40,10 +38,11 @@ def read_gltf(path: Path) -> tuple[SkinnedMesh, dict[str, int]]:
     if document is None:
         raise SkinError(f"{path}: not a glTF, GLB or VRM file")
     try:
-        return _Reader(document, path).read()
+        with np.errstate(invalid="ignore", over="ignore"):  # what is not a number is looked for at the end
+            return _Reader(document, GltfData(document, path.parent)).read()
     except SkinError as error:
         raise SkinError(f"{path}: {error}") from error
-    except (IndexError, KeyError, TypeError, ValueError) as error:
+    except (ArithmeticError, AttributeError, LookupError, MemoryError, TypeError, ValueError) as error:
         raise SkinError(f"{path}: broken glTF, an index or a size in it does not fit ({error})") from error
 
 
@@ -62,8 +61,8 @@ class _Part:
 @dataclass
 class _Reader:
     document: Any
-    path: Path
-    buffers: dict[int, bytes] = field(default_factory=dict)
+    data: GltfData
+    images: dict[int, Array | None] = field(default_factory=dict)
 
     def read(self) -> tuple[SkinnedMesh, dict[str, int]]:
         nodes = self.document.nodes
@@ -91,8 +90,8 @@ class _Reader:
         width = max(part.bones.shape[1] for part in parts)
         starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
         bones, weights = pack_weights(
-            np.concatenate([_widened(part.bones, width) for part in parts]),
-            np.concatenate([_widened(part.weights, width) for part in parts]),
+            np.concatenate([widened(part.bones, width) for part in parts]),
+            np.concatenate([widened(part.weights, width) for part in parts]),
             len(nodes),
         )
         mesh = SkinnedMesh(
@@ -108,6 +107,9 @@ class _Reader:
             bones=bones,
             weights=weights,
         )
+        for what, values in (("vertex", mesh.vertices), ("normal", mesh.normals), ("bone", mesh.joints)):
+            if not np.isfinite(values).all():
+                raise SkinError(f"a {what} of it is at a place that is not a number")
         return mesh, _humanoid_map(self.document.extensions or {})
 
     def _parts(self, index: int, node: Any, poses: Floats, joints: set[int], parents: list[int]) -> list[_Part]:
@@ -125,13 +127,13 @@ class _Reader:
         part = self._rigid(primitive, np.eye(4), 0)
         at_rest = poses[skin.joints]
         if skin.inverseBindMatrices is not None:
-            at_rest = at_rest @ self.accessor(skin.inverseBindMatrices).reshape(-1, 4, 4).transpose(0, 2, 1)
+            at_rest = at_rest @ self.data.accessor(skin.inverseBindMatrices).reshape(-1, 4, 4).transpose(0, 2, 1)
         attributes = primitive.attributes
         sets = [n for n in range(8) if getattr(attributes, f"JOINTS_{n}", None) is not None]
         if not sets:
             raise SkinError("a mesh of the skin has no JOINTS_0 and WEIGHTS_0")
-        local = np.concatenate([self.accessor(getattr(attributes, f"JOINTS_{n}")) for n in sets], axis=1)
-        given = np.concatenate([self.accessor(getattr(attributes, f"WEIGHTS_{n}")) for n in sets], axis=1)
+        local = np.concatenate([self.data.accessor(getattr(attributes, f"JOINTS_{n}")) for n in sets], axis=1)
+        given = np.concatenate([self.data.accessor(getattr(attributes, f"WEIGHTS_{n}")) for n in sets], axis=1)
         local, weights = pack_weights(local.astype(np.int64), given, len(skin.joints))
         blended = np.einsum("vk,vkij->vij", weights, at_rest[local])
         part.vertices = np.einsum("vij,vj->vi", blended[:, :3, :3], part.vertices) + blended[:, :3, 3]
@@ -145,18 +147,18 @@ class _Reader:
             raise SkinError("a mesh is not made of single triangles: export it triangulated")
         if primitive.attributes.POSITION is None:
             raise SkinError("a mesh has no vertex positions")
-        vertices = self.accessor(primitive.attributes.POSITION).astype(float)
+        vertices = self.data.accessor(primitive.attributes.POSITION).astype(float)
         count = len(vertices)
         if primitive.indices is None:
             triangles = np.arange(count - count % 3).reshape(-1, 3)
         else:
-            triangles = self.accessor(primitive.indices).astype(np.int64).reshape(-1, 3)
+            triangles = self.data.accessor(primitive.indices).astype(np.int64).reshape(-1, 3)
         if triangles.size and triangles.max() >= count:
             raise SkinError(f"a triangle uses vertex {triangles.max()} of {count}")
         if primitive.attributes.NORMAL is None:
             normals = vertex_normals(vertices, triangles.astype(np.uint32))
         else:
-            normals = self.accessor(primitive.attributes.NORMAL).astype(float)
+            normals = self.data.accessor(primitive.attributes.NORMAL).astype(float)
         normals = normals @ pose[:3, :3].T
         return _Part(
             vertices=vertices @ pose[:3, :3].T + pose[:3, 3],
@@ -168,67 +170,49 @@ class _Reader:
         )
 
     def _colours(self, primitive: Any, count: int) -> Array:
-        """One colour a vertex: the material's factor times COLOR_0. Textures are not looked at."""
-        if primitive.material is None:
-            colour = np.tile(np.array(SKIN_COLOUR, float) / 255.0, (count, 1))
-        else:
+        """One colour a vertex: the material's colour times its texture there, times COLOR_0."""
+        colour = np.tile(np.array(SKIN_COLOUR, float) / 255.0, (count, 1))
+        surface = None
+        if primitive.material is not None:
             surface = self.document.materials[primitive.material].pbrMetallicRoughness
             factor = (surface.baseColorFactor if surface is not None else None) or (1.0, 1.0, 1.0, 1.0)
             colour = np.tile(np.asarray(factor[:3], float), (count, 1))
+        if surface is not None and surface.baseColorTexture is not None:
+            texture = surface.baseColorTexture
+            places = getattr(primitive.attributes, f"TEXCOORD_{texture.texCoord or 0}", None)
+            image = self._image(self.document.textures[texture.index].source)
+            if places is not None and image is not None:
+                colour = colour * sampled(image, self.data.accessor(places))
         if primitive.attributes.COLOR_0 is not None:
-            colour = colour * self.accessor(primitive.attributes.COLOR_0)[:, :3]
+            colour = colour * self.data.accessor(primitive.attributes.COLOR_0)[:, :3]
         return np.round(255.0 * np.clip(colour, 0.0, 1.0)).astype(np.uint8)
 
-    def accessor(self, index: int) -> Array:
-        """Return an accessor as (count, width); normalised integers as their fractions."""
-        accessor = self.document.accessors[index]
-        dtype = np.dtype("<" + _COMPONENTS[accessor.componentType])
-        width, count = _WIDTHS[accessor.type], accessor.count
-        if accessor.bufferView is None:
-            values = np.zeros((count, width), dtype)
-        else:
-            values = self._view(accessor.bufferView, accessor.byteOffset or 0, dtype, count, width)
-        if accessor.sparse is not None:
-            places, changes = accessor.sparse.indices, accessor.sparse.values
-            kind = np.dtype("<" + _COMPONENTS[places.componentType])
-            changed = accessor.sparse.count
-            at = self._view(places.bufferView, places.byteOffset or 0, kind, changed, 1)[:, 0]
-            values = values.copy()
-            values[at] = self._view(changes.bufferView, changes.byteOffset or 0, dtype, changed, width)
-        if accessor.normalized:
-            values = np.maximum(values / np.iinfo(dtype).max, -1.0)
-        return values
-
-    def _view(self, index: int, offset: int, dtype: np.dtype[Any], count: int, width: int) -> Array:
-        view = self.document.bufferViews[index]
-        row = dtype.itemsize * width
-        stride = view.byteStride or row
-        start = (view.byteOffset or 0) + offset
-        raw = self._buffer(view.buffer)
-        if count and start + (count - 1) * stride + row > len(raw):
-            raise SkinError(
-                f"the file ends early: {len(raw)} bytes where {start + (count - 1) * stride + row} are needed"
-            )
-        return np.ndarray((count, width), dtype, raw, start, (stride, dtype.itemsize))
-
-    def _buffer(self, index: int) -> bytes:
-        if index not in self.buffers:
-            uri = self.document.buffers[index].uri
-            if uri is None:
-                self.buffers[index] = self.document.binary_blob() or b""
-            elif uri.startswith("data:"):
-                self.buffers[index] = self.document.get_data_from_buffer_uri(uri)
+    def _image(self, index: int | None) -> Array | None:
+        """Return an image (H,W,3), 0..1; None for one in a form that cannot be read: the mesh is there without it."""
+        if index is None:
+            return None
+        if index not in self.images:
+            image = self.document.images[index]
+            if image.bufferView is not None:
+                view = self.document.bufferViews[image.bufferView]
+                raw = self.data.view(image.bufferView, 0, np.dtype("u1"), view.byteLength, 1).tobytes()
             else:
-                beside = self.path.parent / unquote(uri)
-                try:
-                    self.buffers[index] = beside.read_bytes()
-                except OSError as error:
-                    raise SkinError(f"its data file {beside}: {error.strerror}") from error
-        return self.buffers[index]
+                raw = self.data.file(image.uri)
+            try:
+                with Image.open(BytesIO(raw)) as picture:
+                    picture.thumbnail((_TEXTURE_SIZE, _TEXTURE_SIZE))  # finer than vertices are
+                    self.images[index] = np.asarray(picture.convert("RGB"), float) / 255.0
+            except (OSError, ValueError, Image.DecompressionBombError):
+                self.images[index] = None
+        return self.images[index]
 
 
-def _widened(values: Array, width: int) -> Array:
-    return np.pad(values, ((0, 0), (0, width - values.shape[1])))
+def sampled(image: Array, places: Array) -> Floats:
+    """Colours (V,3) of an image (H,W,3) at texture coordinates (V,2): x right, y down, repeating."""
+    height, width = image.shape[:2]
+    column = np.clip((places[:, 0] % 1.0) * width, 0, width - 1).astype(np.int64)
+    row = np.clip((places[:, 1] % 1.0) * height, 0, height - 1).astype(np.int64)
+    return np.asarray(image[row, column])
 
 
 def _world_matrices(nodes: list[Any], parents: list[int]) -> Floats:
@@ -259,63 +243,3 @@ def _humanoid_map(extensions: dict[str, Any]) -> dict[str, int]:
         bones = extensions["VRM"]["humanoid"]["humanBones"]
         return {str(bone["bone"]): int(bone["node"]) for bone in bones}
     return {}
-
-
-def write_glb(mesh: SkinnedMesh, path: Path) -> None:
-    """Write a mesh with its bones as a GLB, at most four bones a vertex. Raises SkinError."""
-    if mesh.bones.shape[1] > 4:
-        raise SkinError(f"{mesh.bones.shape[1]} bones on a vertex: a GLB of ours has room for 4")
-    chunks: list[bytes] = []
-    document = gltf.GLTF2(asset=gltf.Asset(version="2.0", generator="arm-ik-service"))
-
-    def add(values: Array, kind: str, component: int, target: int | None = None, *, normalized: bool = False) -> int:
-        data = np.ascontiguousarray(values).tobytes()
-        document.bufferViews.append(
-            gltf.BufferView(buffer=0, byteOffset=sum(map(len, chunks)), byteLength=len(data), target=target)
-        )
-        accessor = gltf.Accessor(
-            bufferView=len(document.bufferViews) - 1,
-            componentType=component,
-            count=values.size // _WIDTHS[kind],
-            type=kind,
-            normalized=normalized,
-        )
-        if kind == "VEC3":
-            accessor.min, accessor.max = values.min(axis=0).tolist(), values.max(axis=0).tolist()
-        document.accessors.append(accessor)
-        chunks.append(data + b"\0" * (-len(data) % 4))
-        return len(document.accessors) - 1
-
-    def four(values: Array, kind: Any) -> Array:
-        return _widened(values, 4).astype(kind)
-
-    inverse_bind = np.tile(np.eye(4, dtype=np.float32), (len(mesh.names), 1, 1))
-    inverse_bind[:, 3, :3] = -mesh.joints  # column-major
-    attributes = gltf.Attributes(
-        POSITION=add(mesh.vertices.astype(np.float32), "VEC3", 5126, 34962),
-        NORMAL=add(mesh.normals.astype(np.float32), "VEC3", 5126, 34962),
-        COLOR_0=add(np.pad(mesh.colours, ((0, 0), (0, 1)), constant_values=255), "VEC4", 5121, 34962, normalized=True),
-        JOINTS_0=add(four(mesh.bones, np.uint8), "VEC4", 5121, 34962),
-        WEIGHTS_0=add(four(mesh.weights, np.float32), "VEC4", 5126, 34962),
-    )
-    indices = add(mesh.triangles.reshape(-1), "SCALAR", 5125, 34963)
-    matrices = add(inverse_bind, "MAT4", 5126)
-    for bone, name in enumerate(mesh.names):
-        above = mesh.parents[bone]
-        offset = mesh.joints[bone] - (mesh.joints[above] if above >= 0 else 0.0)
-        children = [child for child, parent in enumerate(mesh.parents) if parent == bone]
-        document.nodes.append(gltf.Node(name=name, translation=offset.tolist(), children=children))
-    roots = [bone for bone, parent in enumerate(mesh.parents) if parent < 0]
-    document.nodes.append(gltf.Node(name="mesh", mesh=0, skin=0))
-    surface = gltf.PbrMetallicRoughness(baseColorFactor=[1.0, 1.0, 1.0, 1.0], metallicFactor=0.0, roughnessFactor=0.8)
-    document.materials.append(gltf.Material(pbrMetallicRoughness=surface))
-    document.meshes.append(gltf.Mesh(primitives=[gltf.Primitive(attributes=attributes, indices=indices, material=0)]))
-    document.skins.append(gltf.Skin(joints=list(range(len(mesh.names))), inverseBindMatrices=matrices))
-    document.scenes.append(gltf.Scene(nodes=[*roots, len(mesh.names)]))
-    document.scene = 0
-    document.buffers.append(gltf.Buffer(byteLength=sum(map(len, chunks))))
-    document.set_binary_blob(b"".join(chunks))
-    try:
-        document.save_binary(str(path))
-    except OSError as error:
-        raise SkinError(f"{path}: {error.strerror}") from error

@@ -6,16 +6,19 @@ import base64
 import json
 import struct
 from collections.abc import Callable
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from arm_ik_service.errors import SkinError
 from arm_ik_service.geometry import batch
 from arm_ik_service.skin.builtin import built_in_arms
-from arm_ik_service.skin.gltf import read_gltf, write_glb
+from arm_ik_service.skin.gltf import read_gltf
+from arm_ik_service.skin.gltf_writer import write_glb
 from arm_ik_service.skin.load import load_avatar
 
 Document = dict[str, Any]
@@ -182,6 +185,36 @@ def test_a_vrm_s_own_map_of_bones_is_used(arms: Path, tmp_path: Path, version: s
     assert load_avatar(path).arms["left"].elbow[0] < -0.3
 
 
+@pytest.mark.parametrize("form", ["PNG", "JPEG", "broken"])
+def test_a_vertex_has_the_colour_of_its_texture_there(arms: Path, tmp_path: Path, form: str) -> None:
+    """Left half red, right half blue; an image that cannot be read leaves the material's own colour."""
+    document, binary = taken_apart(arms)
+    picture = np.zeros((32, 64, 3), np.uint8)
+    picture[:, :32, 0], picture[:, 32:, 2] = 255, 255
+    data = BytesIO()
+    Image.fromarray(picture).save(data, "PNG" if form == "broken" else form)
+    image = data.getvalue()[: 40 if form == "broken" else None]
+    size = len(built_in_arms().vertices)
+    u = np.where(np.arange(size) % 2, 1.75, 0.25)  # a texture repeats
+    places = np.stack([u, np.full(size, 0.5)], axis=-1).astype("<f4").tobytes()
+    views = len(document["bufferViews"])
+    document["bufferViews"] += [
+        {"buffer": 0, "byteOffset": len(binary), "byteLength": len(places)},
+        {"buffer": 0, "byteOffset": len(binary) + len(places), "byteLength": len(image)},
+    ]
+    document["accessors"].append({"bufferView": views, "componentType": 5126, "count": size, "type": "VEC2"})
+    attributes = document["meshes"][0]["primitives"][0]["attributes"]
+    attributes["TEXCOORD_0"] = len(document["accessors"]) - 1
+    del attributes["COLOR_0"]
+    document["images"], document["textures"] = [{"bufferView": views + 1, "mimeType": "image/png"}], [{"source": 0}]
+    document["materials"][0]["pbrMetallicRoughness"] |= {"baseColorTexture": {"index": 0}}
+    document["buffers"][0]["byteLength"] = len(binary) + len(places) + len(image)
+    colours = read_gltf(put_together(tmp_path / "x.glb", document, binary + places + image))[0].colours
+    even, odd = ([255, 255, 255],) * 2 if form == "broken" else ([255, 0, 0], [0, 0, 255])
+    np.testing.assert_allclose(colours[::2], np.tile(even, (size // 2, 1)), atol=3)
+    np.testing.assert_allclose(colours[1::2], np.tile(odd, (size // 2, 1)), atol=3)
+
+
 def test_a_rigid_mesh_on_a_bone_moves_with_that_bone(arms: Path, tmp_path: Path) -> None:
     """A watch: a mesh without skin, child of the hand's node."""
 
@@ -237,6 +270,14 @@ def weightless(document: Document) -> None:
     document["meshes"][0]["primitives"][0]["attributes"]["WEIGHTS_0"] = zeros(document)
 
 
+def nowhere(document: Document) -> None:
+    document["nodes"][1]["translation"] = [0.0, 1e400, 0.0]
+
+
+def headless(document: Document) -> None:
+    document["accessors"][0] = None
+
+
 def zeros(document: Document) -> int:
     """Index of an accessor of zeros, as wide as weights."""
     count = attribute(document, "POSITION")["count"]
@@ -254,6 +295,8 @@ def zeros(document: Document) -> int:
         (compressed, "compressed with KHR_draco_mesh_compression: export it without compression"),
         (strips, "not made of single triangles"),
         (circle, "their own ancestors"),
+        (nowhere, "at a place that is not a number"),
+        (headless, "broken glTF"),
         (weightless, "vertex 0 has no weight, so no bone would move it"),
     ],
 )

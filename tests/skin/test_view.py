@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from arm_poses import MEASURES
+from harness import Running
 from people import SKELETON, answer
 from rerun.chunk import RrdReader
 
@@ -89,6 +90,19 @@ def test_the_file_s_misplaced_arms_are_mended_and_its_hands_are_at_the_published
         for joint, radius in ((arm.bones.hand.position, 0.035), (arm.bones.forearm.position, 0.055)):
             near = vertices[np.linalg.norm(vertices - np.array(joint), axis=1) < 2.0 * radius]
             assert np.linalg.norm(near.mean(axis=0) - joint) < radius, "the joint is in the middle of what is around it"
+
+
+@pytest.mark.parametrize("command", [("view", "--save", "x.rrd"), ("demo", "--save", "x.rrd"), ("grab", "--fast")])
+def test_an_avatar_that_cannot_be_used_is_one_line_before_anything_starts(
+    tmp_path: Path, command: tuple[str, ...]
+) -> None:
+    path = tmp_path / "person.glb"
+    path.write_bytes(b"not a person")
+    running = Running(*command, "--avatar", str(path))
+    assert running.finish() == 2
+    assert len([line for line in running.lines if line.startswith("arm-ik:")]) == 1
+    assert running.lines[-1].startswith(f"arm-ik: {path}: not a glTF")
+    assert not Path("x.rrd").exists()
 
 
 def test_our_own_arms_need_no_mending() -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from arm_ik_service.errors import SkinError
 from arm_ik_service.skin.builtin import built_in_arms
-from arm_ik_service.skin.gltf import write_glb
+from arm_ik_service.skin.gltf_writer import write_glb
 
 
 def main(arguments: list[str]) -> int:
