@@ -80,7 +80,7 @@ class Page:
         received = await self.socket.receive(timeout=5.0)
         if received.type is WSMsgType.BINARY:
             return msgspec.msgpack.decode(received.data)
-        return self.socket.close_code
+        return received.data if received.type is WSMsgType.CLOSE else self.socket.close_code
 
 
 def with_page(

@@ -75,7 +75,7 @@ class WebBridge:
         self._origins: set[str] = set()
         self._pairing = Pairing(code, papers.secret)
         self._seats: dict[str, tuple[Seat, web.WebSocketResponse]] = {}
-        self._ending: set[asyncio.Task[bool]] = set()
+        self._ending: dict[web.WebSocketResponse, asyncio.Task[bool]] = {}
         self._details: dict[str, tuple[int, str]] = {}
         self._page = _page_files()
 
@@ -104,7 +104,7 @@ class WebBridge:
         finally:
             for _, websocket in list(self._seats.values()):
                 self._end_soon(websocket, messages.RESTART, b"the bridge is stopped")
-            await asyncio.gather(*self._ending, return_exceptions=True)
+            await asyncio.gather(*self._ending.values(), return_exceptions=True)
             await runner.cleanup()
             self._report()
 
@@ -137,6 +137,8 @@ class WebBridge:
         except _DropError as drop:
             self._refuse(drop.cause, f"{who}: {drop}")
             await websocket.close(code=drop.code, message=str(drop).encode()[:120])
+        if (ending := self._ending.pop(websocket, None)) is not None:
+            await ending  # returning would close the socket before it said why
         return websocket
 
     async def _pair(self, websocket: web.WebSocketResponse, address: str) -> str:
@@ -196,9 +198,7 @@ class WebBridge:
 
     def _end_soon(self, websocket: web.WebSocketResponse, code: int, reason: bytes) -> None:
         """Close a socket without waiting for it: its page may be gone, and the new one is here."""
-        task = asyncio.create_task(websocket.close(code=code, message=reason))
-        self._ending.add(task)
-        task.add_done_callback(self._ending.discard)
+        self._ending[websocket] = asyncio.create_task(websocket.close(code=code, message=reason))
 
     def _refuse(self, cause: str, detail: str) -> None:
         self.tally.refused[cause] = self.tally.refused.get(cause, 0) + 1
