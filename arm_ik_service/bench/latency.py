@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -12,6 +11,7 @@ import msgspec
 import numpy as np
 
 from arm_ik_service.bench import echo
+from arm_ik_service.bench.people import moving
 from arm_ik_service.bench.processes import part
 from arm_ik_service.errors import ArmIkError
 from arm_ik_service.io.zenoh_bus import BusOptions, open_client
@@ -19,7 +19,6 @@ from arm_ik_service.io.zenoh_streams import Bus, Stream, declare_stream, has_lis
 from arm_ik_service.programs.demo import free_endpoint
 from arm_ik_service.wire import codec
 from arm_ik_service.wire.keys import Keys
-from arm_ik_service.wire.messages import VERSION, ControllerFrame, TrackedPose
 
 WARM_UP_FRAMES = 90  # connections, caches and the first solves; not counted
 ANSWERED_WITHIN_S = 1.0
@@ -69,23 +68,6 @@ class Latency(NamedTuple):
         """All of it, by name."""
         found = self._asdict() | {"p50_ratio": self.p50_ratio, "p99_ratio": self.p99_ratio}
         return found | {"service": self.service._asdict(), "echo": self.echo._asdict()}
-
-
-def moving(seq: int, rate_hz: float) -> ControllerFrame:
-    """Return a frame of a person who waves both hands: every frame is work for the solver."""
-    t = seq / rate_hz
-    level = (0.0, 0.0, 0.0, 1.0)
-    wave = 0.2 * math.sin(3.0 * t)
-    return ControllerFrame(
-        version=VERSION,
-        seq=seq,
-        sample_time_ns=int(t * 1e9),
-        publish_time_ns=time.time_ns(),
-        space="stage",
-        head=TrackedPose((0.02 * wave, 1.6, 0.0), level),
-        left=TrackedPose((-0.25, 1.1 + wave, -0.35), level),
-        right=TrackedPose((0.25, 1.1 - wave, -0.35), level),
-    )
 
 
 class Line:

@@ -21,10 +21,11 @@ ENDS_WITHIN_S = 10.0
 class Part:
     """One Python module running beside us. It says `ready` on standard error, and its result on standard output."""
 
-    def __init__(self, module: str, *arguments: str) -> None:
+    def __init__(self, module: str, *arguments: str, inside: tuple[str, ...] = ()) -> None:
+        """`inside` is a command that runs another, such as `ip netns exec NAME`."""
         self._name = " ".join((module, *arguments[:1]))
         self.popen = subprocess.Popen(
-            [sys.executable, "-P", "-m", module, *arguments],
+            [*inside, sys.executable, "-P", "-m", module, *arguments],
             stdin=subprocess.PIPE,  # it closes with us, and a part that reads it ends then
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,

@@ -10,7 +10,7 @@ import sys
 
 import typer
 
-from arm_ik_service.cli.bench import bench
+from arm_ik_service.cli.bench_service import bench
 from arm_ik_service.cli.bridge import bridge
 from arm_ik_service.cli.certificates import certificates
 from arm_ik_service.cli.convert import convert

@@ -8,6 +8,7 @@ everybody who connects to it, and does nothing else.
 from __future__ import annotations
 
 import json
+import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -26,6 +27,10 @@ LEASE_MS = 1000
 KEEP_ALIVES_PER_LEASE = 4
 _PEERS_MS = 300
 _RETRY = {"period_init_ms": 200, "period_max_ms": 1000, "period_increase_factor": 1.5}
+
+# To close a link that was cut, with data under way, blocks one of Zenoh's receiving threads for up to 10 s (SO_LINGER,
+# eclipse-zenoh/zenoh#1101). Of the default two, one link to each of two lost machines would take both.
+_RUNTIME = "(rx: (worker_threads: 8))"
 
 Role = Literal["hub", "client", "router"]
 
@@ -68,6 +73,7 @@ class BusOptions:
 
 
 def _configuration(options: BusOptions, role: Role) -> zenoh.Config:
+    os.environ.setdefault("ZENOH_RUNTIME", _RUNTIME)  # read when the first session of the process is opened
     try:
         config = zenoh.Config.from_file(str(options.config_file)) if options.config_file else zenoh.Config()
     except zenoh.ZError as error:
