@@ -94,6 +94,14 @@ def _right_arm(arm: Arm) -> dict[str, Array]:
     }
 
 
+def _on_the_left(name: str, pose: Array) -> Array:
+    """Reflect a pose (7,). ISB bones keep +Z to the person's right, so their own z is reflected and not their x."""
+    across = np.diag([-1.0, 1.0, 1.0])
+    own = across if name == "hand" else np.diag([1.0, 1.0, -1.0])
+    rotation = batch.from_matrix(across @ batch.matrix(pose[3:]) @ own)
+    return np.concatenate([across @ pose[:3], rotation])
+
+
 def _pose(pose: Array) -> Pose:
     x, y, z, qx, qy, qz, qw = (float(v) for v in pose)
     return Pose((x, y, z), (qx, qy, qz, qw))
@@ -147,7 +155,7 @@ def person(
     for side, arm in zip(SIDES, (left, right), strict=True):
         poses: dict[str, Any] = _right_arm(arm)
         if side == "left":
-            poses = {name: batch.mirror_pose(pose) for name, pose in poses.items()}
+            poses = {name: _on_the_left(name, pose) for name, pose in poses.items()}
         bones = Bones(**{name: _pose(batch.compose(chest, pose)) for name, pose in poses.items()})
         arms[side] = _state(arm, bones, tracking)
     return ArmsState(

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from arm_ik_service.cli.options import ProfileFile, SettingsFile, say
+from arm_ik_service.cli.options import ProfileName, SettingsFile, say
 from arm_ik_service.exports.dialects import McapDialect
 
 
@@ -25,7 +25,7 @@ def convert(
     fps: Annotated[
         float | None, typer.Option(min=1.0, max=1000.0, help="For .bvh: frames a second; else the recording's own.")
     ] = None,
-    profile: ProfileFile = None,
+    profile: ProfileName = None,
     settings: SettingsFile = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an existing file.")] = False,
 ) -> None:
@@ -53,7 +53,7 @@ def convert(
         raise SessionError(f"{output}: is the session itself; write to another file")
     with frames_progress(session.name, recording.frame_count) as progress:
         if arms:
-            from arm_ik_service.body.profile import load_profile
+            from arm_ik_service.body.profile_store import find_profile
             from arm_ik_service.programs.export_session import export_session
             from arm_ik_service.settings import load_settings
 
@@ -64,7 +64,7 @@ def convert(
                 avatar=avatar,
                 mirror=mirror,
                 fps=fps,
-                profile=load_profile(profile) if profile else None,
+                profile=find_profile(profile) if profile else None,
                 settings=load_settings(settings) if settings else None,
                 progress=progress,
             )

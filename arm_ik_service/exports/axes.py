@@ -66,9 +66,22 @@ _RIGHT_T_POSE: dict[Segment, Quaternion] = {
     "forearm": g.from_columns(DOWN, LEFT, FORWARD),  # ISB, pronated by 90 degrees: its front faces down
     "hand": g.from_columns(BACK, UP, LEFT),  # OpenXR wrist frame: -Z to the fingers, +Y out of the back of the hand
 }
+
+
+def mirrored_segment(segment: Segment, q: Quaternion) -> Quaternion:
+    """Reflect a segment's world rotation in the plane x = 0, as that of the same segment on the other side.
+
+    The hand's own axes change sides as the world's do (x). ISB bones keep +Z to the person's right on both sides: half
+    a turn about the bone's own axis.
+    """
+    reflected = g.mirror_rotation(q)
+    return reflected if segment == "hand" else g.multiply(reflected, _HALF_TURN)
+
+
+_HALF_TURN: Quaternion = (0.0, 1.0, 0.0, 0.0)
 T_POSE: dict[Side, dict[Segment, Quaternion]] = {
     "right": _RIGHT_T_POSE,
-    "left": {segment: g.mirror_rotation(q) for segment, q in _RIGHT_T_POSE.items()},
+    "left": {segment: mirrored_segment(segment, q) for segment, q in _RIGHT_T_POSE.items()},
 }
 T_POSE_PRONATION = math.pi / 2
 

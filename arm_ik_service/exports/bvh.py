@@ -1,8 +1,9 @@
 """BVH: both arms with their clavicles and the head, on a root at the chest; for Blender and every animation tool.
 
 Metres, y up, a person who faces -z: Blender's import settings as they come, at life size. Joints have Unity's humanoid
-names. The offsets are a T-pose (see `axes.py`), so all rotations are zero there. Root, head and upper arms also have
-position channels, which replace the offset, as animation tools read them: shoulders slide a little on their clavicles.
+names. The offsets are a T-pose (see `axes.py`), so all rotations are zero there. Every joint has position channels too,
+which replace its offset, as animation tools read them: shoulders slide on their clavicles, and the measures of a person
+who is not calibrated are learned while they move. Tools that take rotations only get the lengths of the first state.
 
 BVH has one frame time. Frames are written one a state; a pause in the recording holds the last pose, and where states
 come closer together than the frame time some are left out, so that the motion never runs ahead or behind by more than
@@ -12,6 +13,7 @@ come closer together than the frame time some are left out, so that the motion n
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 from statistics import median
@@ -19,7 +21,7 @@ from statistics import median
 from arm_ik_service.body.profile import HAND_PER_STATURE, UPPER_ARM_PER_STATURE
 from arm_ik_service.errors import SessionError
 from arm_ik_service.exports.axes import bvh_euler_deg
-from arm_ik_service.exports.posture import ArmPosture, Joint, Posture, in_parent, posture_of
+from arm_ik_service.exports.posture import Joint, Posture, in_parent, posture_of
 from arm_ik_service.geometry import scalar as g
 from arm_ik_service.geometry.scalar import Quaternion, Vector
 from arm_ik_service.wire.messages import SIDES, ArmsState
@@ -30,8 +32,9 @@ RESAMPLING_SLACK = 0.5  # frames, with a frame rate that was asked for
 COUNT_WIDTH = 10  # digits kept free for the number of frames, known at the end only
 MOST_HELD = 36_000  # frames that one pause may fill; a longer one is a clock that was set
 
-ROTATION = "Zrotation Xrotation Yrotation"
-POSITION = "Xposition Yposition Zposition"
+CHANNELS = "Xposition Yposition Zposition Zrotation Xrotation Yrotation"
+ARM = ("Shoulder", "UpperArm", "LowerArm", "Hand")
+HEAD_M = 0.1  # length that the head's bone is drawn with
 
 
 class BvhWriter:
@@ -47,8 +50,6 @@ class BvhWriter:
         self._time_s, self._last_ns = 0.0, 0
         self._line = ""
         self._angles: dict[str, Vector] = {}
-        self._root = Joint((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
-        self._clavicles: dict[str, Vector] = {}
         try:
             self._file = path.open("w", encoding="ascii", newline="\n")
         except OSError as error:
@@ -82,9 +83,7 @@ class BvhWriter:
             steps = [b.sample_time_ns - a.sample_time_ns for a, b in pairwise(states)]
             forward = [step for step in steps if step > 0]
             self._frame_s = 1e-9 * median(forward) if forward else 1.0 / 90.0
-        first = posture_of(states[0])
-        self._clavicles = {side: in_parent(first.chest, arm.clavicle).position for side, arm in first.arms()}
-        self._file.write(_hierarchy(first, self._clavicles))
+        self._file.write(_hierarchy(posture_of(states[0])))
         self._file.write("MOTION\nFrames: ")
         self._count_at = self._file.tell()
         self._file.write(f"{0:<{COUNT_WIDTH}}\nFrame Time: {self._frame_s:.9f}\n")
@@ -115,22 +114,9 @@ class BvhWriter:
     def _motion(self, posture: Posture) -> str:
         """Return the line of channels, joints in the order of the hierarchy."""
         numbers: list[float] = []
-        chest = posture.chest
-        numbers += chest.position
-        numbers += self._euler("Chest", chest.rotation)
-        head = in_parent(chest, posture.head)
-        numbers += head.position
-        numbers += self._euler("Head", head.rotation)
-        for side, arm in posture.arms():
-            # the shoulder's place is taken from where the file puts the clavicle, so that no error adds up
-            root = g.add(chest.position, g.rotate(chest.rotation, self._clavicles[side]))
-            clavicle = Joint(root, arm.clavicle.rotation)
-            upper_arm = in_parent(clavicle, arm.upper_arm)
-            numbers += self._euler(f"{side} clavicle", in_parent(chest, clavicle).rotation)
-            numbers += upper_arm.position
-            numbers += self._euler(f"{side} upper arm", upper_arm.rotation)
-            numbers += self._euler(f"{side} lower arm", in_parent(arm.upper_arm, arm.lower_arm).rotation)
-            numbers += self._euler(f"{side} hand", in_parent(arm.lower_arm, arm.hand).rotation)
+        for name, joint in _local_joints(posture):
+            numbers += joint.position
+            numbers += self._euler(name, joint.rotation)
         return " ".join([f"{number:.6f}" for number in numbers]) + "\n"
 
     def _euler(self, joint: str, q: Quaternion) -> Vector:
@@ -155,44 +141,47 @@ def _unwrapped(before: Vector, angles: Vector) -> Vector:
     return (z, x, y)
 
 
-def _hierarchy(first: Posture, clavicles: dict[str, Vector]) -> str:
+def _local_joints(posture: Posture) -> Iterator[tuple[str, Joint]]:
+    """Give every joint in its parent, in the order of the hierarchy."""
+    chest = posture.chest
+    yield "Chest", chest
+    yield "Head", in_parent(chest, posture.head)
+    for side, arm in posture.arms():
+        for bone, parent, joint in zip(ARM, (chest, *arm), arm, strict=False):
+            yield f"{side.capitalize()}{bone}", in_parent(parent, joint)
+
+
+def _hierarchy(first: Posture) -> str:
     """Return the tree: lengths of the first state, in a T-pose."""
-    lines = ["HIERARCHY", "ROOT Chest", "{", *_offset(1, (0.0, 0.0, 0.0), position=True)]
-    head = in_parent(first.chest, first.head).position
+    places = {name: joint.position for name, joint in _local_joints(first)}
+    lines = ["HIERARCHY", "ROOT Chest", "{", *_joint(1, (0.0, 0.0, 0.0))]
     lines += [
         "  JOINT Head",
         "  {",
-        *_offset(2, (0.0, g.norm(head), 0.0), position=True),
-        *_end(2, (0.0, 0.1, 0.0)),
+        *_joint(2, (0.0, g.norm(places["Head"]), 0.0)),
+        *_end(2, (0.0, HEAD_M, 0.0)),
         "  }",
     ]
-    for side, arm in zip(SIDES, (first.left, first.right), strict=True):
-        lines += _arm(side.capitalize(), arm, clavicles[side], -1.0 if side == "left" else 1.0)
+    for side in SIDES:
+        name, outwards = side.capitalize(), -1.0 if side == "left" else 1.0
+        upper_arm_m, forearm_m = g.norm(places[f"{name}LowerArm"]), g.norm(places[f"{name}Hand"])
+        hand_m = upper_arm_m * HAND_PER_STATURE / UPPER_ARM_PER_STATURE
+        offsets: list[Vector] = [
+            places[f"{name}Shoulder"],
+            places[f"{name}UpperArm"],
+            (outwards * upper_arm_m, 0.0, 0.0),
+            (outwards * forearm_m, 0.0, 0.0),
+        ]
+        for depth, (bone, offset) in enumerate(zip(ARM, offsets, strict=True), 1):
+            lines += [f"{'  ' * depth}JOINT {name}{bone}", "  " * depth + "{", *_joint(depth + 1, offset)]
+        lines += _end(len(ARM) + 1, (outwards * hand_m, 0.0, 0.0))
+        lines += ["  " * depth + "}" for depth in range(len(ARM), 0, -1)]
     return "\n".join([*lines, "}", ""])
 
 
-def _arm(name: str, arm: ArmPosture, clavicle: Vector, outwards: float) -> list[str]:
-    shoulder = in_parent(arm.clavicle, arm.upper_arm).position
-    upper_arm_m = g.norm(g.subtract(arm.lower_arm.position, arm.upper_arm.position))
-    forearm_m = g.norm(g.subtract(arm.hand.position, arm.lower_arm.position))
-    hand_m = upper_arm_m * HAND_PER_STATURE / UPPER_ARM_PER_STATURE
-    joints = [
-        (f"{name}Shoulder", clavicle, False),
-        (f"{name}UpperArm", shoulder, True),
-        (f"{name}LowerArm", (outwards * upper_arm_m, 0.0, 0.0), False),
-        (f"{name}Hand", (outwards * forearm_m, 0.0, 0.0), False),
-    ]
-    lines: list[str] = []
-    for depth, (joint, offset, position) in enumerate(joints, 1):
-        lines += [f"{'  ' * depth}JOINT {joint}", "  " * depth + "{", *_offset(depth + 1, offset, position=position)]
-    lines += _end(len(joints) + 1, (outwards * hand_m, 0.0, 0.0))
-    return lines + ["  " * depth + "}" for depth in range(len(joints), 0, -1)]
-
-
-def _offset(depth: int, offset: Vector, *, position: bool) -> list[str]:
+def _joint(depth: int, offset: Vector) -> list[str]:
     indent = "  " * depth
-    channels = f"6 {POSITION} {ROTATION}" if position else f"3 {ROTATION}"
-    return [f"{indent}OFFSET {offset[0]:.6f} {offset[1]:.6f} {offset[2]:.6f}", f"{indent}CHANNELS {channels}"]
+    return [f"{indent}OFFSET {offset[0]:.6f} {offset[1]:.6f} {offset[2]:.6f}", f"{indent}CHANNELS 6 {CHANNELS}"]
 
 
 def _end(depth: int, offset: Vector) -> list[str]:

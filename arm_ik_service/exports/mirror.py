@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import msgspec
 
+from arm_ik_service.exports.axes import Segment, mirrored_segment
 from arm_ik_service.geometry import scalar as g
 from arm_ik_service.wire.messages import ArmsState, ArmState, Bones, ControllerFrame, Pose, TrackedPose, Vector
 
@@ -28,8 +29,19 @@ def _pose(pose: Pose) -> Pose:
 
 def _arm(arm: ArmState) -> ArmState:
     bones = arm.bones
-    reflected = Bones(_pose(bones.clavicle), _pose(bones.upper_arm), _pose(bones.forearm), _pose(bones.hand))
-    return msgspec.structs.replace(arm, bones=reflected)
+    return msgspec.structs.replace(
+        arm,
+        bones=Bones(
+            clavicle=_segment("clavicle", bones.clavicle),
+            upper_arm=_segment("upper_arm", bones.upper_arm),
+            forearm=_segment("forearm", bones.forearm),
+            hand=_segment("hand", bones.hand),
+        ),
+    )
+
+
+def _segment(segment: Segment, pose: Pose) -> Pose:
+    return Pose(g.mirror_vector(pose.position), mirrored_segment(segment, pose.orientation))
 
 
 def _device(pose: TrackedPose | None) -> TrackedPose | None:

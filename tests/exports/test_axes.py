@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import islice
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -9,10 +11,16 @@ from hypothesis import strategies as st
 from postures import BENT, HANGING, RAISED, Arm, T, person
 
 from arm_ik_service.arm.model import ArmModel
+from arm_ik_service.body.profile import Profile
+from arm_ik_service.body.shoulders import STERNOCLAVICULAR
 from arm_ik_service.exports.axes import OPENXR, ROS, UNITY, Axes, bvh_euler_deg, unity_euler_deg
 from arm_ik_service.exports.mirror import mirrored
 from arm_ik_service.exports.posture import posture_of
 from arm_ik_service.geometry import batch
+from arm_ik_service.io.session import open_session
+from arm_ik_service.programs.demo import bundled_session
+from arm_ik_service.programs.offline import solve_frames
+from arm_ik_service.settings import Settings
 from arm_ik_service.wire.messages import SIDES
 
 angle = st.floats(-179.0, 179.0)
@@ -51,6 +59,29 @@ def test_the_postures_of_these_tests_are_those_of_the_arm_model() -> None:
         assert batch.angle_between(hand[3:], bones.hand.orientation) < 1e-7
         elbow = np.subtract(bones.forearm.position, bones.upper_arm.position)
         np.testing.assert_allclose(poses["elbow"][0][:3], elbow, atol=1e-9)
+        assert batch.angle_between(poses["elbow"][0][3:], bones.forearm.orientation) < 1e-7
+
+
+def test_a_solved_persons_bones_point_where_their_rotations_since_the_t_pose_say() -> None:
+    frames = islice(open_session(bundled_session("boxing")).frames(), 0, 900, 30)
+    for _, state in solve_frames(frames, Profile(), Settings()):
+        for side, arm in posture_of(state).arms():
+            outwards = 1.0 if side == "right" else -1.0
+            for joint, following in (
+                (arm.upper_arm, arm.lower_arm),
+                (arm.lower_arm, arm.hand),
+            ):
+                bone = np.subtract(following.position, joint.position)
+                pointing = batch.rotate(joint.rotation, (outwards, 0.0, 0.0))
+                np.testing.assert_allclose(bone / np.linalg.norm(bone), pointing, atol=1e-6)
+            x, y, z = (outwards, 1.0, 1.0) * (np.array([1.0, 0.0, 0.0]) - STERNOCLAVICULAR)
+            bone = np.subtract(arm.upper_arm.position, arm.clavicle.position)
+            along = batch.rotate(arm.clavicle.rotation, batch.normalized((x, y, z)))
+            np.testing.assert_allclose(bone / np.linalg.norm(bone), along, atol=1e-6)
+            bend = batch.rotate(arm.upper_arm.rotation, (0.0, 1.0, 0.0))  # elbows bend about what is up in the T-pose
+            forearm = batch.rotate(arm.lower_arm.rotation, (outwards, 0.0, 0.0))
+            assert abs(bend @ forearm) < np.sin(np.radians(16.0))  # the carrying angle
+            assert batch.rotate(arm.upper_arm.rotation, (0.0, 0.0, -1.0)) @ forearm > -0.01  # and to the front only
 
 
 @pytest.mark.parametrize("axes", [OPENXR, UNITY, ROS])
