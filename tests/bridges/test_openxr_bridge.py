@@ -262,7 +262,7 @@ def test_without_a_runtime_the_command_ends_with_one_line_that_says_how_to_get_o
 def test_what_it_publishes_is_recorded_and_replayed_identically(hub: Hub, scripted: ScriptedXr, tmp_path: Path) -> None:
     log = tmp_path / "openxr.mcap"
     recorder = Running("record", str(log), "--connect", hub.endpoint)
-    time.sleep(1.5)
+    time.sleep(1.2)
     scripted.devices[VIEW].flags = 0x7
     live = Live(hub, scripted, "recorded")
     sent = heard(hub, "recorded", 80)

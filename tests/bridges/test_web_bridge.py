@@ -228,7 +228,7 @@ def test_the_page_names_no_other_host() -> None:
 def test_what_it_publishes_is_recorded_and_replayed_identically(hub: Hub, web_bridge: Served, tmp_path: Path) -> None:
     log = tmp_path / "web.mcap"
     recorder = Running("record", str(log), "--connect", hub.endpoint)
-    time.sleep(2.0)
+    time.sleep(1.2)
     avatar = with_page(web_bridge, lambda page: pair_and_send(page, 60))
     sent = heard(hub, avatar, 60)
     assert recorder.end() == 0
