@@ -89,6 +89,14 @@ def forearm_columns(configuration: Any) -> Columns:
 
 
 @compiled
+def wrist_at(chain: Record, configuration: Any) -> Vector:
+    """Return the wrist [m] of a configuration (10,), right arm, ISB axes."""
+    base = columns_of((configuration[0], configuration[1], configuration[2], configuration[3]))
+    elbow = scale(-chain.upper_arm_m, base[1])
+    return add(elbow, scale(-chain.forearm_m, forearm_columns(configuration)[1]))
+
+
+@compiled
 def forward(chain: Record, configuration: Any) -> tuple[Vector, Vector, Quaternion, Quaternion, Quaternion]:
     """Return elbow and wrist [m] and the rotations of upper arm, forearm and hand bone, right arm, ISB axes."""
     q = (configuration[0], configuration[1], configuration[2], configuration[3])

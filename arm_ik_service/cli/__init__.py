@@ -12,9 +12,12 @@ import typer
 
 from arm_ik_service.cli.bench_service import bench
 from arm_ik_service.cli.bridge import bridge
+from arm_ik_service.cli.calibrate import calibrate
 from arm_ik_service.cli.certificates import certificates
+from arm_ik_service.cli.check import check
 from arm_ik_service.cli.convert import convert
 from arm_ik_service.cli.demo import demo
+from arm_ik_service.cli.doctor import doctor
 from arm_ik_service.cli.export import export
 from arm_ik_service.cli.grab import grab
 from arm_ik_service.cli.record import record
@@ -23,6 +26,7 @@ from arm_ik_service.cli.router import router
 from arm_ik_service.cli.schema import schema
 from arm_ik_service.cli.serve import serve
 from arm_ik_service.cli.solve import solve
+from arm_ik_service.cli.top import top
 from arm_ik_service.cli.view import view
 from arm_ik_service.errors import ArmIkError
 
@@ -34,7 +38,7 @@ app = typer.Typer(
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (demo, serve, replay, record, view, solve, convert, export, schema, router, certificates, grab):
+for command in (demo, serve, replay, record, view, solve, check, calibrate, convert, export, schema, router, certificates, top, doctor, grab):
     app.command()(command)
 app.add_typer(bench)
 app.add_typer(bridge, name="bridge")

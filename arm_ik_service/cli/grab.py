@@ -12,7 +12,7 @@ from arm_ik_service.cli.options import (
     AvatarFile,
     Connect,
     Listen,
-    ProfileFile,
+    ProfileName,
     Scouting,
     SkinningChoice,
     ZenohConfig,
@@ -42,7 +42,7 @@ def grab(
     fast: Annotated[bool, typer.Option("--fast", help="As fast as it goes, without Zenoh.")] = False,
     avatar: AvatarFile = None,
     skinning: SkinningChoice = None,
-    profile: ProfileFile = None,
+    profile: ProfileName = None,
     connect: Connect = None,
     listen: Listen = None,
     scouting: Scouting = False,
@@ -57,7 +57,7 @@ def grab(
     """
     import numpy as np
 
-    from arm_ik_service.body.profile import load_profile
+    from arm_ik_service.body.profile_store import find_profile
     from arm_ik_service.errors import SettingsError
     from arm_ik_service.ik.registry import parse_solver
     from arm_ik_service.io.rerun_view import Save, Sink, Spawn, has_display
@@ -75,7 +75,7 @@ def grab(
     scene = Scene(
         place("cube", cube),
         place("goal", goal) if goal is not None else None,
-        profile=load_profile(profile),
+        profile=find_profile(profile),
         choice=parse_solver(solver),
     )
     if save is None and not no_view and not has_display():

@@ -61,9 +61,9 @@ Access = Annotated[
         rich_help_panel="Zenoh",
     ),
 ]
-ProfileFile = Annotated[
-    Path | None,
-    typer.Option("--profile", metavar="FILE", help="Calibration profile of the person, TOML."),
+ProfileName = Annotated[
+    str | None,
+    typer.Option("--profile", metavar="NAME|FILE", help="Calibration profile: a saved one by name, or a TOML file."),
 ]
 SettingsFile = Annotated[
     Path | None,

@@ -10,7 +10,7 @@ from arm_ik_service.cli.options import (
     Access,
     Connect,
     Listen,
-    ProfileFile,
+    ProfileName,
     Scouting,
     SettingsFile,
     TlsAuthority,
@@ -27,7 +27,7 @@ def serve(
     name: Annotated[
         str | None, typer.Option(help="Name of this service on the bus; default: host and process.")
     ] = None,
-    profile: ProfileFile = None,
+    profile: ProfileName = None,
     settings: SettingsFile = None,
     connect: Connect = None,
     listen: Listen = None,
@@ -51,7 +51,7 @@ def serve(
     import socket
     import time
 
-    from arm_ik_service.body.profile import load_profile
+    from arm_ik_service.body.profile_store import find_profile
     from arm_ik_service.cli.warm_up import warm_up
     from arm_ik_service.io.zenoh_bus import open_hub
     from arm_ik_service.io.zenoh_log import log_zenoh
@@ -63,7 +63,7 @@ def serve(
     host = re.sub(r"[^A-Za-z0-9_-]", "-", socket.gethostname())[:40]
     service_name = check_id(name or f"{host}-{os.getpid()}")
     options = bus_options(connect, listen, scouting, zenoh_config, tls_cert, tls_key, tls_ca, access)
-    used_profile, used_settings = load_profile(profile), load_settings(settings)
+    used_profile, used_settings = find_profile(profile), load_settings(settings)
     log_zenoh(denials=access is not None)
     with open_hub(options, waiting=say) as bus:
         warm_up(used_settings, say)

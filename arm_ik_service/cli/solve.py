@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from arm_ik_service.cli.options import Json, ProfileFile, SettingsFile, say
+from arm_ik_service.cli.options import Json, ProfileName, SettingsFile, say
 
 if TYPE_CHECKING:
     from arm_ik_service.body.profile import Profile
@@ -20,7 +20,7 @@ def solve(
     output: Annotated[
         Path | None, typer.Option("-o", "--output", metavar="FILE", help="Where the result goes: .npz or .mcap.")
     ] = None,
-    profile: ProfileFile = None,
+    profile: ProfileName = None,
     settings: SettingsFile = None,
     avatar: Annotated[str | None, typer.Option(help="Solve only this one of several people.")] = None,
     verify: Annotated[
@@ -37,7 +37,7 @@ def solve(
     """
     import json
 
-    from arm_ik_service.body.profile import load_profile
+    from arm_ik_service.body.profile_store import find_profile
     from arm_ik_service.errors import SettingsError
     from arm_ik_service.io.session import open_session
     from arm_ik_service.settings import load_settings
@@ -47,7 +47,7 @@ def solve(
     if output is not None and output.suffix not in (".npz", ".mcap"):
         raise SettingsError(f"-o {output}: the result is a .npz or an .mcap file")
     used_settings = load_settings(settings)
-    used_profile = load_profile(profile) if profile else None
+    used_profile = find_profile(profile) if profile else None
     recording = open_session(session)
     report: dict[str, Any] = {}
     if output is not None:

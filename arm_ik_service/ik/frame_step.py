@@ -8,20 +8,22 @@
    closed form at the nearest such swivel, within the same budget. That is a jump of the elbow that the hand demands.
 5. A position met with the hand turned far off, although another swivel could meet both: the elbow travels there at a
    bounded speed, over as many frames as it takes, and the hand keeps its position on the way.
+6. Whatever came of it, the elbow moves no further than the hand does and ELBOW_STEP_M more, as long as the hand can keep
+   its position: its rotation follows a few frames later.
 """
 
 from __future__ import annotations
 
 import math
 
-from arm_ik_service.arm.chain import Columns, columns_of
+from arm_ik_service.arm.chain import Columns, columns_of, wrist_at
 from arm_ik_service.arm.limits import clamp_swing, clamp_twist
 from arm_ik_service.compiled import Record, compiled
-from arm_ik_service.geometry.scalar import Vector, clip, exp, multiply, scale
+from arm_ik_service.geometry.scalar import Vector, clip, exp, multiply, norm, scale, subtract, wrap
 from arm_ik_service.ik.clock import monotonic_ns
 from arm_ik_service.ik.comfort import discomfort, learn_habit, slope_and_curvature
-from arm_ik_service.ik.conjugate import OUT_OF_TIME, SOLVED, converge
-from arm_ik_service.ik.swivel import Reach, posture_at, reach_to, swivel_of, take, violation
+from arm_ik_service.ik.conjugate import NEAREST, OUT_OF_TIME, SOLVED, converge
+from arm_ik_service.ik.swivel import Reach, elbow_swivel, posture_at, reach_to, swivel_of, take, violation
 
 SEEDS = 24  # swivels looked at when there is no good start: every 15 degrees
 FLAT = 0.3  # curvature below which discomfort counts as flat: Newton's step would be too long
@@ -30,7 +32,7 @@ HALF_SURE = 1.0  # curvature at which the elbow's confidence is one half
 STUCK_M = 5e-3  # a position missed by more than this is worth a jump of the elbow
 STUCK_RAD = 0.26  # a hand turned further off than this (15 degrees) is worth the elbow's way to another swivel
 ESCAPE_HASTE = 2.0  # times swivel_speed_rad_s on that way
-ELBOW_STEP_M = 0.04  # [m] of the elbow in one frame of it, whatever the frame rate
+ELBOW_STEP_M = 0.04  # [m] of the elbow in one frame beyond what the hand moves, whatever the frame rate
 POSITION_ALONE = 1e-4  # share of the rotation's weight on that way
 POSITION_FIRST = 0.01  # share of the rotation's weight that is left once the target is known to be out of reach
 _NEARNESS = 0.02  # [1/rad] what a far swivel must gain to be preferred to a near one
@@ -145,6 +147,10 @@ def follow_target(arm: Record, settings: Record, position: Vector, rotation: Col
     if not _finished(status) and work.position_error_m > settings.position_tolerance_m:
         _converge(arm, settings, position, rotation, (budget - used) // 2, POSITION_FIRST, deadline)
         used += work.iterations
+    if not _finished(status) and work.position_error_m > STUCK_M:
+        anchor = arm.anchor
+        swivel = elbow_swivel(reach, columns_of((anchor[0], anchor[1], anchor[2], anchor[3])))
+        used = reach_with_any_rotation(arm, settings, position, rotation, reach, swivel, used)
     for attempt in range(2):
         if not _finished(status) and work.position_error_m > STUCK_M:
             margin, nearness = (0.0, _NEARNESS) if attempt == 0 else (_ROOM, 0.0)
@@ -158,6 +164,42 @@ def follow_target(arm: Record, settings: Record, position: Vector, rotation: Col
         if violation(arm.chain, posture_at(reach, rotation, wanted), 0.0) < _POSSIBLE:
             arm.escape = wanted - swivel
     work.iterations, arm.status = used, status
+
+
+@compiled
+def reach_with_any_rotation(
+    arm: Record, settings: Record, position: Vector, rotation: Columns, reach: Reach, swivel: float, used: int
+) -> int:
+    """Put the hand where it should be at a given swivel, turned as far as the wrist goes. Return iterations.
+
+    In closed form, then by the loop where the shoulder's limits were in the way; undone if it is no nearer.
+    """
+    chain, work, q, kept = arm.chain, arm.work, arm.configuration, arm.kept
+    for i in range(10):
+        kept[i] = q[i]
+    position_error, orientation_error, held = work.position_error_m, work.orientation_error_rad, work.held
+    take(chain, posture_at(reach, rotation, swivel), q)
+    # Any rotation is within this tolerance: the loop would turn the hand by sliding the elbow on.
+    converge(
+        chain,
+        work,
+        q,
+        position,
+        rotation,
+        max(settings.iterations - used, 0),
+        POSITION_ALONE * settings.rotation_weight_m * settings.rotation_weight_m,
+        settings.position_tolerance_m,
+        2.0 * math.pi,
+        0,
+    )
+    used += work.iterations
+    if work.position_error_m > max(STUCK_M, position_error):
+        for i in range(10):
+            q[i] = kept[i]
+        work.position_error_m, work.orientation_error_rad, work.held = position_error, orientation_error, held
+    else:
+        arm.restarted, arm.status = 0, NEAREST
+    return used
 
 
 @compiled
@@ -229,9 +271,32 @@ def _start_again(
 
 
 @compiled
+def hold_elbow(arm: Record, settings: Record, position: Vector, rotation: Columns, reach: Reach) -> None:
+    """Step 6: where the elbow has gone too far from `arm.anchor`, turn it only part of the way, in closed form."""
+    chain, q, anchor = arm.chain, arm.configuration, arm.anchor
+    upper_arm = columns_of((anchor[0], anchor[1], anchor[2], anchor[3]))
+    moved = subtract(columns_of((q[0], q[1], q[2], q[3]))[1], upper_arm[1])
+    step_m = chain.upper_arm_m * norm(moved)
+    if step_m <= ELBOW_STEP_M:
+        return
+    allowed_m = ELBOW_STEP_M + norm(subtract(position, wrist_at(chain, anchor)))
+    if step_m <= allowed_m:
+        return
+    before = elbow_swivel(reach, upper_arm)
+    turn = wrap(elbow_swivel(reach, columns_of((q[0], q[1], q[2], q[3]))) - before)
+    most = ELBOW_STEP_M / max(reach[2] * chain.upper_arm_m, 1e-3)
+    swivel = before + clip(turn, -most, most)
+    arm.work.iterations = reach_with_any_rotation(
+        arm, settings, position, rotation, reach, swivel, arm.work.iterations
+    )
+
+
+@compiled
 def step_frame(arm: Record, settings: Record, position: Vector, rotation: Columns, dt_s: float) -> None:
     """Take one frame: `position` and `rotation` of the hand bone, right arm, ISB axes."""
     reach = reach_to(arm.chain, position)
+    for i in range(10):
+        arm.anchor[i] = arm.configuration[i]
     if arm.escape != 0.0:
         escape(arm, settings, position, rotation, reach, dt_s)
     else:
@@ -240,6 +305,7 @@ def step_frame(arm: Record, settings: Record, position: Vector, rotation: Column
         else:  # a hand that cannot be met leaves no swivel free
             arm.swivel_speed = 0.0
         follow_target(arm, settings, position, rotation, reach)
+    hold_elbow(arm, settings, position, rotation, reach)
     learn_habit(arm.habit, arm.configuration, dt_s)
 
 

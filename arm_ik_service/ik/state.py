@@ -26,6 +26,7 @@ ARM = record_dtype(
         ("swivel_speed", np.float64),  # [rad/s] of the elbow about the arm's line, for comfort
         ("escape", np.float64),  # [rad] swivel still to go to where the hand can be met; 0: none
         ("kept", np.float64, (10,)),  # the best so far while another start is tried
+        ("anchor", np.float64, (10,)),  # configuration at the beginning of the frame
         # the answer; positions and rotations in the shoulder frame of the arm's own side
         ("configuration", np.float64, (10,)),
         ("velocity", np.float64, (9,)),  # [rad/s], tangent order

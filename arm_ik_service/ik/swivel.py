@@ -19,6 +19,8 @@ from arm_ik_service.arm.limits import clamp_swing, clamp_twist, swing_excess, tw
 from arm_ik_service.compiled import Record, compiled
 from arm_ik_service.geometry.scalar import Vector, clip, cross, dot, from_columns, norm, scale, subtract
 
+NEARLY_STRAIGHT = 0.1  # sine of the angle between upper arm and line of reach below which the elbow says no swivel
+
 Reach = tuple[Columns, float, float, float]  # line to the wrist with two normals, elbow along and off it, flexion
 Posture = tuple[Columns, float, float, float, float]  # upper arm; elbow flexion, pronation, wrist flexion, deviation
 
@@ -44,6 +46,15 @@ def reach_to(chain: Record, position: Vector) -> Reach:
 def swivel_of(reach: Reach, upper_arm: Columns) -> float:
     """Swivel of an upper arm about the line of `reach`."""
     return math.atan2(dot(upper_arm[2], reach[0][1]), -dot(upper_arm[2], reach[0][2]))
+
+
+@compiled
+def elbow_swivel(reach: Reach, upper_arm: Columns) -> float:
+    """Swivel of the elbow itself, which a carrying angle takes out of the arm's plane; the plane's, if nearly straight."""
+    out, aside = -dot(upper_arm[1], reach[0][1]), -dot(upper_arm[1], reach[0][2])
+    if out * out + aside * aside < NEARLY_STRAIGHT * NEARLY_STRAIGHT:
+        return swivel_of(reach, upper_arm)
+    return math.atan2(aside, out)
 
 
 @compiled

@@ -1,0 +1,42 @@
+"""A hand that turns further than any wrist can follow must not throw the elbow about, nor lose its place."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from arm_ik_service.arm.model import ArmModel
+from arm_ik_service.geometry import batch
+from arm_ik_service.ik.frame_step import ELBOW_STEP_M, STUCK_M
+from arm_ik_service.ik.jacobian_transpose import JacobianTranspose
+
+FRAMES, RATE_HZ = 1500, 90.0
+CARRY_M = 0.015  # of the elbow on its circle, as the reach changes from frame to frame
+
+
+def tumbling(seed: int) -> batch.Array:
+    """Hands (FRAMES, 7) that stay before the right shoulder and turn every way, most of the time out of range."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(FRAMES)[:, None] / RATE_HZ
+    waves = [rng.normal(size=3) * np.sin(2 * np.pi * f * t + rng.uniform(0, 6, 3)) for f in (0.3, 0.7, 1.5, 2.2)]
+    sway = 0.05 * np.sin(2 * np.pi * np.array([0.5, 0.7, 0.9]) * t)
+    return np.concatenate([np.array([0.1, -0.25, -0.35]) + sway, batch.exp(1.2 * np.sum(waves, axis=0))], axis=1)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_elbow_moves_little_more_than_the_hand_and_the_hand_keeps_its_place(seed: int) -> None:
+    arm = ArmModel.load(side="right")
+    targets = tumbling(seed)
+    track = JacobianTranspose(arm, frame_rate_hz=RATE_HZ).track(targets)
+    assert np.mean(track.orientation_error_rad > 0.1) > 0.3  # the stream is as hostile as it is meant to be
+    elbow = arm.forward(track.configuration)["elbow"][:, :3]
+    steps = np.linalg.norm(np.diff(elbow, axis=0), axis=1)
+    hand_steps = np.linalg.norm(np.diff(targets[:, :3], axis=0), axis=1)
+    assert np.max(steps - hand_steps) < ELBOW_STEP_M + CARRY_M
+    assert np.percentile(track.position_error_m, 99.0) < STUCK_M
+    assert np.max(track.position_error_m) < 0.03
+
+
+def test_the_budget_is_kept_on_the_most_hostile_stream() -> None:
+    solver = JacobianTranspose(ArmModel.load(side="right"), iterations=20)
+    assert solver.track(tumbling(7)).iterations.max() <= 20
