@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import contextlib
 import http.server
 import math
@@ -11,6 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 from bridges.browser import Browser, Tab, running_browser
@@ -80,7 +82,7 @@ def world(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterato
 def desktop(browser: Browser, world: World) -> Iterator[Tab]:
     """The page without a headset, answered by the service."""
     tab = browser.open(world.bridge)
-    assert tab.until("armIk.latency.count > 0")
+    assert tab.until("armIk.latency.count > 0 && armIk.drawn.seq !== null")
     yield tab
     assert tab.errors == []
     tab.page.context.close()
@@ -92,7 +94,7 @@ def headset(browser: Browser, world: World) -> Iterator[Tab]:
     tab = browser.open(world.bridge, headset=True)
     assert tab.until("armIk.link.state === 'open' && !document.getElementById('enter').disabled")
     tab.page.click("#enter")
-    assert tab.until("armIk.latency.count > 0 && Object.keys(armIk.poses.aims).length === 2")
+    assert tab.until("armIk.drawn.seq !== null && Object.keys(armIk.poses.aims).length === 2")
     yield tab
     assert tab.errors == []
     tab.page.context.close()
@@ -364,3 +366,59 @@ def test_two_headsets_are_two_avatars_at_once(world: World, desktop: Tab, headse
         before = tab.run("armIk.arms.seq")
         assert tab.until(f"armIk.arms.seq > {before} + 5")
         assert tab.run("armIk.arms.avatar") == tab.avatar
+
+
+VALUES: list[Any] = [
+    None,
+    True,
+    False,
+    *(
+        sign * (2**power + more)
+        for sign in (1, -1)
+        for power in (0, 5, 7, 8, 15, 16, 31, 32, 52)
+        for more in (-1, 0, 1)
+    ),
+    1_700_000_000_123_456_789,
+    -(2**62),
+    0.1,
+    -1e300,
+    "",
+    "ä" * 40,
+    "x" * 70_0,
+    [],
+    list(range(20)),
+    {f"key {n}": [n, {"deep": [None, -0.5]}] for n in range(20)},
+]
+
+
+def test_the_pages_messagepack_is_everybodys(desktop: Tab) -> None:
+    given = base64.b64encode(msgspec.msgpack.encode(VALUES)).decode()
+    returned = desktop.page.evaluate(
+        """async (given) => {
+          const { decode, encode } = await import('/msgpack.js');
+          const bytes = encode(decode(Uint8Array.from(atob(given), (c) => c.charCodeAt(0)).buffer));
+          return Array.from(bytes);
+        }""",
+        given,
+    )
+    assert msgspec.msgpack.decode(bytes(returned)) == VALUES
+
+
+def test_the_pages_clock_follows_the_bridges_without_a_step_unless_it_was_set(desktop: Tab) -> None:
+    """Pings that find the bridge 5 ms later, then a second later, than the first ones did."""
+    first, slewed, jumped = desktop.page.evaluate(
+        """async () => {
+          const { BridgeClock } = await import('/clock.js');
+          const clock = new BridgeClock();
+          const asked = (fromMs, shiftMs) => Array.from({ length: 200 }, (_, k) => {
+            if (k % 10 === 0) clock.add(fromMs + 10 * k - 1, fromMs + 10 * k + 1, BigInt((fromMs + 10 * k + shiftMs) * 1e6));
+            return Number(clock.toBridgeNs(fromMs + 10 * k)) / 1e6;
+          });
+          return [asked(0, 1000), asked(2000, 1005), asked(4000, 2000)];
+        }"""
+    )
+    assert first == [1000 + 10 * k for k in range(200)]
+    steps = np.diff([first[-1], *slewed])
+    assert np.all(np.abs(steps - 10.0) <= 10.0 * 0.0005 + 1e-6)
+    assert slewed[-1] > 4990 + 0.2  # on its way
+    assert jumped[-1] == 4000 + 1990 + 2000

@@ -194,15 +194,17 @@ class WebBridge:
             seat.close()
             self.tally.published += seat.published
             self.tally.returned += seat.returned
+            if seat.foreign:
+                self._refuse("foreign", f"{avatar}: what somebody else put on its keys", seat.foreign)
             log.info("%s: left after %d frames", avatar, seat.published)
 
     def _end_soon(self, websocket: web.WebSocketResponse, code: int, reason: bytes) -> None:
         """Close a socket without waiting for it: its page may be gone, and the new one is here."""
         self._ending[websocket] = asyncio.create_task(websocket.close(code=code, message=reason))
 
-    def _refuse(self, cause: str, detail: str) -> None:
-        self.tally.refused[cause] = self.tally.refused.get(cause, 0) + 1
-        self._details[cause] = (self._details.get(cause, (0, ""))[0] + 1, detail)
+    def _refuse(self, cause: str, detail: str, count: int = 1) -> None:
+        self.tally.refused[cause] = self.tally.refused.get(cause, 0) + count
+        self._details[cause] = (self._details.get(cause, (0, ""))[0] + count, detail)
 
     def _report(self) -> None:
         """Say once a second what was refused, so that nobody can fill a disk."""

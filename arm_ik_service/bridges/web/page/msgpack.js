@@ -18,20 +18,29 @@ export function encode(value) {
     at += count;
     return start;
   }
-  const byte = (value) => view.setUint8(room(1), value);
-  const long = (first, value) => (byte(first), view.setBigInt64(room(8), value));
+  // Room first: making it may replace the view that is written to.
+  function write(method, count, value) {
+    const start = room(count);
+    view[method](start, value);
+  }
+  const byte = (value) => write("setUint8", 1, value);
+
+  function long(value) {
+    byte(0xd3);
+    write("setBigInt64", 8, value);
+  }
 
   function number(value) {
     if (!Number.isSafeInteger(value) || Object.is(value, -0)) {
       byte(0xcb);
-      view.setFloat64(room(8), value);
+      write("setFloat64", 8, value);
     } else if (value >= -32 && value < 128) {
       byte(value & 0xff);
     } else if (value >= -0x80000000 && value < 0x80000000) {
       byte(0xd2);
-      view.setInt32(room(4), value);
+      write("setInt32", 4, value);
     } else {
-      long(0xd3, BigInt(value));
+      long(BigInt(value));
     }
   }
 
@@ -39,18 +48,19 @@ export function encode(value) {
   function head(first, small, wide, count) {
     if (count < small) return byte(first | count);
     byte(wide);
-    view.setUint16(room(2), count);
+    write("setUint16", 2, count);
   }
 
   function put(value) {
     if (value === null || value === undefined) byte(0xc0);
     else if (typeof value === "boolean") byte(value ? 0xc3 : 0xc2);
     else if (typeof value === "number") number(value);
-    else if (typeof value === "bigint") long(0xd3, value);
+    else if (typeof value === "bigint") long(value);
     else if (typeof value === "string") {
       const encoded = text.encoder.encode(value);
       head(0xa0, 32, 0xda, encoded.length);
-      bytes.set(encoded, room(encoded.length));
+      const start = room(encoded.length);
+      bytes.set(encoded, start);
     } else if (Array.isArray(value)) {
       head(0x90, 16, 0xdc, value.length);
       value.forEach(put);
