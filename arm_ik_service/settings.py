@@ -44,8 +44,8 @@ class SolverSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     iterations: Annotated[int, Meta(ge=1, le=10_000)] = 32  # a frame's budget: 0.3 us each
     time_limit_us: Annotated[float, Meta(ge=0.0)] = 0.0  # of one arm's frame; 0: iterations alone bound it
     # Tighter than an eye needs: what is left of the error is noise in the published velocity.
-    position_tolerance_m: Annotated[float, Meta(gt=0.0)] = 1e-4
-    orientation_tolerance_rad: Annotated[float, Meta(gt=0.0)] = 1e-3
+    position_tolerance_m: Annotated[float, Meta(gt=0.0)] = 2e-5
+    orientation_tolerance_rad: Annotated[float, Meta(gt=0.0)] = 2e-4
     # the lever on which a radian of hand rotation weighs as much as a metre of position: a hand's length and a bit
     rotation_weight_m: Annotated[float, Meta(gt=0.0)] = 0.14
     swivel_speed_rad_s: Annotated[float, Meta(ge=0.0)] = 4.0  # the elbow about the arm's line, for comfort alone

@@ -8,8 +8,8 @@
    closed form at the nearest such swivel, within the same budget. That is a jump of the elbow that the hand demands.
 5. A position met with the hand turned far off, although another swivel could meet both: the elbow travels there at a
    bounded speed, over as many frames as it takes, and the hand keeps its position on the way.
-6. Whatever came of it, the elbow moves no further than the hand does and ELBOW_STEP_M more, as long as the hand can keep
-   its position: its rotation follows a few frames later.
+6. Whatever came of it, the elbow moves no further than the hand does and ELBOW_STEP_M more, as long as the hand can
+   keep its position: its rotation follows a few frames later.
 """
 
 from __future__ import annotations
@@ -119,8 +119,33 @@ def _deadline(settings: Record) -> int:
 
 
 @compiled
-def find_target(arm: Record, settings: Record, position: Vector, rotation: Columns, reach: Reach) -> None:
+def nearest_with_room(chain: Record, position: Vector) -> Vector:
+    """Return the wrist position itself, or the nearest that a fully bent elbow leaves room for.
+
+    In the hole around the shoulder nothing tells one posture from another: a hand that crosses it threw the arm about.
+    """
+    upper, lower = chain.upper_arm_m, chain.forearm_m
+    nearest = math.sqrt(upper * upper + lower * lower + 2.0 * upper * lower * math.cos(chain.upper[0]))
+    distance = norm(position)
+    if distance >= nearest:
+        return position
+    return scale(nearest / distance, position) if distance > 1e-6 else (0.0, -nearest, 0.0)
+
+
+@compiled
+def report_error(arm: Record, asked: Vector, position: Vector) -> None:
+    """Leave in `arm` how far the hand is from what was asked, where `position` was granted instead."""
+    arm.position_error_m, arm.orientation_error_rad = arm.work.position_error_m, arm.work.orientation_error_rad
+    if position != asked:
+        arm.position_error_m = norm(subtract(asked, wrist_at(arm.chain, arm.configuration)))
+        arm.status = NEAREST
+
+
+@compiled
+def find_target(arm: Record, settings: Record, asked: Vector, rotation: Columns) -> None:
     """Meet one target by itself from the configuration at hand: other starts are as good as the one given."""
+    position = nearest_with_room(arm.chain, asked)
+    reach = reach_to(arm.chain, position)
     arm.restarted, arm.escape = 0, 0.0
     work, budget, deadline = arm.work, settings.iterations, _deadline(settings)
     status = _converge(arm, settings, position, rotation, _first_share(budget), 1.0, deadline)
@@ -135,6 +160,7 @@ def find_target(arm: Record, settings: Record, position: Vector, rotation: Colum
         _converge(arm, settings, position, rotation, max(budget - used, 0), POSITION_FIRST, deadline)
         used += work.iterations
     work.iterations, arm.status = used, status
+    report_error(arm, asked, position)
 
 
 @compiled
@@ -286,14 +312,13 @@ def hold_elbow(arm: Record, settings: Record, position: Vector, rotation: Column
     turn = wrap(elbow_swivel(reach, columns_of((q[0], q[1], q[2], q[3]))) - before)
     most = ELBOW_STEP_M / max(reach[2] * chain.upper_arm_m, 1e-3)
     swivel = before + clip(turn, -most, most)
-    arm.work.iterations = reach_with_any_rotation(
-        arm, settings, position, rotation, reach, swivel, arm.work.iterations
-    )
+    arm.work.iterations = reach_with_any_rotation(arm, settings, position, rotation, reach, swivel, arm.work.iterations)
 
 
 @compiled
-def step_frame(arm: Record, settings: Record, position: Vector, rotation: Columns, dt_s: float) -> None:
-    """Take one frame: `position` and `rotation` of the hand bone, right arm, ISB axes."""
+def step_frame(arm: Record, settings: Record, asked: Vector, rotation: Columns, dt_s: float) -> None:
+    """Take one frame: position and rotation asked of the hand bone, right arm, ISB axes."""
+    position = nearest_with_room(arm.chain, asked)
     reach = reach_to(arm.chain, position)
     for i in range(10):
         arm.anchor[i] = arm.configuration[i]
@@ -306,13 +331,14 @@ def step_frame(arm: Record, settings: Record, position: Vector, rotation: Column
             arm.swivel_speed = 0.0
         follow_target(arm, settings, position, rotation, reach)
     hold_elbow(arm, settings, position, rotation, reach)
+    report_error(arm, asked, position)
     learn_habit(arm.habit, arm.configuration, dt_s)
 
 
 @compiled
-def first_frame(arm: Record, settings: Record, position: Vector, rotation: Columns) -> None:
+def first_frame(arm: Record, settings: Record, asked: Vector, rotation: Columns) -> None:
     """Take a frame without a past: start at the most comfortable swivel."""
     arm.swivel_speed = 0.0
-    reach = reach_to(arm.chain, position)
+    reach = reach_to(arm.chain, nearest_with_room(arm.chain, asked))
     take(arm.chain, posture_at(reach, rotation, most_comfortable(arm, reach, rotation)), arm.configuration)
-    find_target(arm, settings, position, rotation, reach)
+    find_target(arm, settings, asked, rotation)

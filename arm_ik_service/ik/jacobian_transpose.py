@@ -13,7 +13,6 @@ from arm_ik_service.compiled import compiled
 from arm_ik_service.ik.frame_step import find_target, first_frame, step_frame
 from arm_ik_service.ik.solver import Solution, Status, Track, as_targets
 from arm_ik_service.ik.state import new_arm
-from arm_ik_service.ik.swivel import reach_to
 from arm_ik_service.settings import SolverSettings, to_record
 
 _STATUSES = tuple(Status)
@@ -99,10 +98,10 @@ def _solve(arms: Any, settings: Any, target: Any, start: Any, configuration: Any
         arm.configuration[i] = start[i]
     position = position_to_arm(chain, (target[0], target[1], target[2]))
     rotation = columns_of(hand_to_arm(chain, (target[3], target[4], target[5], target[6])))
-    find_target(arm, settings[0], position, rotation, reach_to(chain, position))
+    find_target(arm, settings[0], position, rotation)
     for i in range(10):
         configuration[i] = arm.configuration[i]
-    outcome[0], outcome[1], outcome[2] = work.iterations, work.position_error_m, work.orientation_error_rad
+    outcome[0], outcome[1], outcome[2] = work.iterations, arm.position_error_m, arm.orientation_error_rad
     outcome[3] = arm.status
 
 
@@ -136,5 +135,5 @@ def _track(
         for i in range(10):
             configurations[n, i] = arm.configuration[i]
         iterations[n] = work.iterations
-        position_errors[n], orientation_errors[n] = work.position_error_m, work.orientation_error_rad
+        position_errors[n], orientation_errors[n] = arm.position_error_m, arm.orientation_error_rad
         statuses[n] = arm.status

@@ -18,11 +18,12 @@ from arm_ik_service.arm.chain import (
 from arm_ik_service.arm.limits import swing_excess, twist_excess, twist_of
 from arm_ik_service.compiled import Record, compiled
 from arm_ik_service.geometry.scalar import clip, quaternion, scale, store, vector
-from arm_ik_service.ik.conjugate import AT_LIMIT, SOLVED, move
+from arm_ik_service.ik.conjugate import SOLVED, move
 from arm_ik_service.ik.frame_step import first_frame, step_frame
 from arm_ik_service.ik.state import ARM, initialise_arm
 from arm_ik_service.ik.velocity import ITERATIONS, SPEED_BIT, difference, velocity_from_twist
 
+RESTS_RAD = 1e-3  # nearer to a limit than this the arm rests on it, for whoever reads the mask
 MIN_DT_S, MAX_DT_S = 1e-3, 0.1  # a frame's time outside this says nothing about speed
 
 
@@ -82,12 +83,12 @@ def limits_at(chain: Record, configuration: Any) -> int:
     """Bit mask over arm.model.LIMITS of the limits that a configuration (10,) rests on."""
     bone = columns_of((configuration[0], configuration[1], configuration[2], configuration[3]))
     twist, height = twist_of(bone), -bone[1][1]
-    mask = 1 if swing_excess(chain, scale(-1.0, bone[1])) > -AT_LIMIT else 0
-    if twist_excess(chain, twist + AT_LIMIT, height) > 0.0 or twist_excess(chain, twist - AT_LIMIT, height) < 0.0:
+    mask = 1 if swing_excess(chain, scale(-1.0, bone[1])) > -RESTS_RAD else 0
+    if twist_excess(chain, twist + RESTS_RAD, height) > 0.0 or twist_excess(chain, twist - RESTS_RAD, height) < 0.0:
         mask |= 2
     for i in range(6):
         angle = configuration[4 + i]
-        if angle <= chain.lower[i] + AT_LIMIT or angle >= chain.upper[i] - AT_LIMIT:
+        if angle <= chain.lower[i] + RESTS_RAD or angle >= chain.upper[i] - RESTS_RAD:
             mask |= 4 << i
     return mask
 
@@ -105,8 +106,6 @@ def _show(arm: Record) -> None:
     joint_angles(arm.configuration, arm.velocity, arm.angles, arm.angle_rates)
     arm.isb_singular = isb_shoulder(arm.configuration, arm.isb)
     arm.iterations = work.iterations
-    arm.position_error_m = work.position_error_m
-    arm.orientation_error_rad = work.orientation_error_rad
 
 
 @compiled

@@ -50,7 +50,7 @@ def swivel_of(reach: Reach, upper_arm: Columns) -> float:
 
 @compiled
 def elbow_swivel(reach: Reach, upper_arm: Columns) -> float:
-    """Swivel of the elbow itself, which a carrying angle takes out of the arm's plane; the plane's, if nearly straight."""
+    """Swivel of the elbow itself, which a carrying angle takes out of the arm's plane; if straight, the plane's."""
     out, aside = -dot(upper_arm[1], reach[0][1]), -dot(upper_arm[1], reach[0][2])
     if out * out + aside * aside < NEARLY_STRAIGHT * NEARLY_STRAIGHT:
         return swivel_of(reach, upper_arm)
