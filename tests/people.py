@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from arm_ik_service.geometry import batch
-from arm_ik_service.io.rerun_view import OPENXR_GRIP
+from arm_ik_service.io.rerun_view.entities import grips_of
 from arm_ik_service.wire.messages import (
     VERSION,
     ArmsState,
@@ -89,7 +89,7 @@ def _arm(side: Side, lift: float, state: TrackingState = "tracked") -> ArmState:
 
 
 def _grip(side: Side, arm: ArmState, error: Vector = (0.0, 0.0, 0.0)) -> TrackedPose:
-    grip, hand = OPENXR_GRIP[side], arm.bones.hand
+    grip, hand = grips_of(SKELETON)[side], arm.bones.hand
     pose = batch.compose([*hand.position, *hand.orientation], [*grip.position, *grip.orientation])
     x, y, z = (float(v) for v in pose[:3] + np.array(error))
     a, b, c, d = (float(v) for v in pose[3:])

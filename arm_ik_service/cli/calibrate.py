@@ -32,8 +32,8 @@ def calibrate(
         Path | None, typer.Argument(metavar="[SESSION]", help="A recording; without one, the person who is live.")
     ] = None,
     pose: Annotated[
-        Pose | None, typer.Option(help="What the person does; default: whatever is found, the surest first.")
-    ] = None,
+        Pose, typer.Option(help="What the person does: stands in a pose, or just moves about.")
+    ] = "moving",
     avatar: Annotated[
         str | None, typer.Option(help="Whose controllers to listen to, or to take of a recording.")
     ] = None,
@@ -97,7 +97,7 @@ def calibrate(
         say(f"saved: {path}; use it with --profile {name or path}")
 
 
-def _live(bus: Bus, avatar: str, pose: Pose | None, seconds: float, keys: Keys) -> np.ndarray[Any, Any]:
+def _live(bus: Bus, avatar: str, pose: Pose, seconds: float, keys: Keys) -> np.ndarray[Any, Any]:
     """Tell the person what to do and listen."""
     import sys
 
@@ -106,7 +106,7 @@ def _live(bus: Bus, avatar: str, pose: Pose | None, seconds: float, keys: Keys) 
 
     from arm_ik_service.programs.calibrator import POSES, as_records, gather_live
 
-    say(POSES[pose or "moving"])
+    say(POSES[pose])
     columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed:.0f} of {task.total:.0f} s"))
     with Progress(*columns, console=Console(stderr=True), disable=not sys.stderr.isatty()) as bar:
         task = bar.add_task(f"listening to {avatar}", total=seconds)

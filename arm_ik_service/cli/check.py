@@ -13,9 +13,12 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rich.console import Console
+    from rich.table import Table
 
+    from arm_ik_service.body.report import ArmReport
     from arm_ik_service.io.session import RecordedFrame
     from arm_ik_service.programs.checker import PersonReport
+    from arm_ik_service.tracking.report import DeviceReport
     from arm_ik_service.wire.messages import ArmsState
 
 SHOWN = 4  # glitches and gaps listed by time; --json has them all
@@ -92,8 +95,6 @@ def _times(times: tuple[float, ...]) -> str:
 
 def _print(console: Console, report: PersonReport) -> None:
     """Show one avatar: the stream, its devices, its arms."""
-    from rich.table import Table
-
     stream = report.devices
     console.print(
         f"[bold]{report.avatar}[/bold]: {stream.frames} frames in {stream.seconds:.1f} s, {stream.rate_hz:.1f} Hz; "
@@ -106,51 +107,44 @@ def _print(console: Console, report: PersonReport) -> None:
         f"gaps: {_times(gaps)}{f', the longest {longest:.2f} s' if gaps else ''}; "
         f"recentres: {_times(stream.recentre_times_s)}"
     )
-    devices = Table(
-        "device",
-        "tracked",
-        "inferred",
-        "held",
-        "lost",
-        "longest loss",
-        "speed p50 / p99 / max",
-        "turn p99 / max",
-        "glitches",
-    )
-    for name, device in stream.devices.items():
-        devices.add_row(
-            name,
-            *(f"{100 * share:.1f} %" for share in (device.tracked, device.inferred, device.held, device.lost)),
-            f"{device.longest_loss_s:.2f} s",
-            f"{device.speed_p50_m_s:.2f} / {device.speed_p99_m_s:.2f} / {device.speed_max_m_s:.2f} m/s",
-            f"{57.3 * device.turn_p99_rad_s:.0f} / {57.3 * device.turn_max_rad_s:.0f} °/s",
-            _times(device.glitch_times_s),
-        )
-    console.print(devices)
-    arms = Table(
-        "arm",
-        "residual p50 / p99",
-        "rotation p50 / p99",
-        "reach p50 / p99",
-        "beyond reach",
-        "iterations p50 / p99",
-        "elbow step",
-        "flips",
-        "elbow jerk",
-        "time at limits",
-    )
-    for side, arm in report.arms.items():
-        limits = ", ".join(f"{name} {100 * share:.0f} %" for name, share in list(arm.limit_time.items())[:SHOWN])
-        arms.add_row(
-            side,
-            f"{1e3 * arm.position_error_p50_m:.2f} / {1e3 * arm.position_error_p99_m:.2f} mm",
-            f"{57.3 * arm.orientation_error_p50_rad:.2f} / {57.3 * arm.orientation_error_p99_rad:.2f}°",
-            f"{100 * arm.reach_p50:.0f} / {100 * arm.reach_p99:.0f} %",
-            f"{100 * arm.out_of_reach:.1f} %",
-            f"{arm.iterations_p50:.0f} / {arm.iterations_p99:.0f}",
-            f"{100 * arm.elbow_step_max_m:.1f} cm",
-            str(arm.elbow_flips),
-            f"{arm.elbow_jerk_rms_m_s3:.0f} m/s³",
-            limits or "none",
-        )
-    console.print(arms)
+    console.print(_table(dict(zip(stream.devices, map(_device, stream.devices.values()), strict=True))))
+    console.print(_table(dict(zip(report.arms, map(_arm, report.arms.values()), strict=True))))
+
+
+def _table(columns: dict[str, dict[str, str]]) -> Table:
+    """Return a table with a measure a row and a device or an arm a column: it fits a narrow terminal."""
+    from rich.table import Table
+
+    table = Table("", *columns)
+    for measure in next(iter(columns.values())):
+        table.add_row(measure, *(column[measure] for column in columns.values()))
+    return table
+
+
+def _device(device: DeviceReport) -> dict[str, str]:
+    return {
+        "tracked": f"{100 * device.tracked:.1f} %",
+        "inferred": f"{100 * device.inferred:.1f} %",
+        "held": f"{100 * device.held:.1f} %",
+        "lost": f"{100 * device.lost:.1f} %",
+        "longest loss": f"{device.longest_loss_s:.2f} s",
+        "speed p50": f"{device.speed_p50_m_s:.2f} m/s",
+        "speed p99, max": f"{device.speed_p99_m_s:.2f}, {device.speed_max_m_s:.2f} m/s",
+        "turn p99, max": f"{57.3 * device.turn_p99_rad_s:.0f}, {57.3 * device.turn_max_rad_s:.0f} °/s",
+        "glitches": _times(device.glitch_times_s),
+    }
+
+
+def _arm(arm: ArmReport) -> dict[str, str]:
+    limits = [f"{name} {100 * share:.0f} %" for name, share in list(arm.limit_time.items())[:SHOWN]]
+    return {
+        "residual p50, p99": f"{1e3 * arm.position_error_p50_m:.2f}, {1e3 * arm.position_error_p99_m:.2f} mm",
+        "rotation p50, p99": f"{57.3 * arm.orientation_error_p50_rad:.2f}, {57.3 * arm.orientation_error_p99_rad:.2f}°",
+        "reach p50, p99": f"{100 * arm.reach_p50:.0f}, {100 * arm.reach_p99:.0f} %",
+        "beyond reach": f"{100 * arm.out_of_reach:.1f} %",
+        "iterations p50, p99": f"{arm.iterations_p50:.0f}, {arm.iterations_p99:.0f}",
+        "longest elbow step": f"{100 * arm.elbow_step_max_m:.1f} cm",
+        "elbow flips": str(arm.elbow_flips),
+        "elbow jerk": f"{arm.elbow_jerk_rms_m_s3:.0f} m/s³",
+        "time at limits": "\n".join(limits) or "none",
+    }

@@ -48,8 +48,8 @@ def clean_poses(raw: npt.ArrayLike) -> tuple[batch.Array, Flags]:
         unit = np.abs(norm - 1.0) < NORM_TOLERANCE
     finite = np.isfinite(raw[:, :3]).all(axis=1, keepdims=True)
     rotation = np.where(unit, raw[:, 3:], (0.0, 0.0, 0.0, 1.0)) / np.where(unit, norm, 1.0)
-    poses = np.concatenate([np.where(finite, raw[:, :3], 0.0), rotation], axis=1)
-    return poses, np.where(finite[:, 0], POSITION, 0) | np.where(unit[:, 0], ORIENTATION, 0)
+    poses: batch.Array = np.concatenate([np.where(finite, raw[:, :3], 0.0), rotation], axis=1)
+    return poses, np.asarray(POSITION * finite[:, 0] + ORIENTATION * unit[:, 0], np.int64)
 
 
 class FrozenDevice:

@@ -22,7 +22,7 @@ class Viewer:
         """Open the sinks and subscribe; people are drawn as `skin`, or as solids. Raises ViewError."""
         self._keys = keys
         self._stopped = Event()
-        self._view = LiveView(RerunView(*sinks, name="arm-ik", spacing_m=SPACING_M, skin=skin))
+        self._view = LiveView(RerunView(*sinks, name="arm-ik", spacing_m=SPACING_M, skin=skin), when_gone=self.stop)
         self.refused = 0
         self._subscribers = [
             subscribe(bus, keys.controllers(), self._guarded(self._take_frame)),
@@ -41,10 +41,15 @@ class Viewer:
         self._stopped.wait(duration_s)
 
     def close(self) -> str:
-        """Draw the rest, let go of the sinks, and return one line that says what was shown."""
+        """Draw the rest, let go of the sinks, and return one line that says what was shown.
+
+        Raises ViewError where the viewer was closed, or does not take the rest.
+        """
         for subscriber in self._subscribers:
             subscriber.undeclare()
         self._view.close()
+        if self._view.error is not None:
+            raise self._view.error
         return f"{self._view.shown} answers drawn, {self._view.dropped} pictures dropped"
 
     def _guarded(self, take: Callable[[str, bytes], None]) -> Callable[[str, bytes, int], None]:

@@ -12,10 +12,9 @@ from arm_ik_service.io.rerun_view.live import LiveView
 from arm_ik_service.io.rerun_view.picture import write_picture
 from arm_ik_service.io.rerun_view.sinks import Connect, Save, Sink, Spawn, Web, has_display
 from arm_ik_service.io.rerun_view.skinned import Skin
-from arm_ik_service.io.rerun_view.view import OPENXR_GRIP, RerunView, write_recording
+from arm_ik_service.io.rerun_view.view import RerunView, write_recording
 
 __all__ = [
-    "OPENXR_GRIP",
     "Connect",
     "LiveView",
     "RerunView",

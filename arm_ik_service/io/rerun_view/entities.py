@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 
 import numpy as np
 import rerun as rr
@@ -38,6 +38,11 @@ def _mesh(solid: Solid) -> rr.Mesh3D:
         triangle_indices=solid.triangles,
         vertex_colors=solid.colours,
     )
+
+
+def grips_of(skeleton: Skeleton) -> dict[Side, Pose]:
+    """Return wrist_from_grip of both sides."""
+    return {"left": skeleton.left_wrist_from_grip, "right": skeleton.right_wrist_from_grip}
 
 
 def skeleton_of(arms: ArmsState) -> Skeleton:
@@ -132,7 +137,7 @@ class Sender:
         self._states: dict[Side, TrackingState | None] = dict.fromkeys(SIDES)
         self._time: list[rr.TimeColumn] = []
 
-    def describe(self, skeleton: Skeleton, wrist_from_grip: Mapping[Side, Pose]) -> None:
+    def describe(self, skeleton: Skeleton) -> None:
         """Log the solids, static; from now on the plots have these limits, the residual line starts at these grips."""
         for name, solid in _solids(skeleton).items():
             if name not in self._replaced:
@@ -142,7 +147,7 @@ class Sender:
         limits = {limit.name: (limit.lower, limit.upper) for limit in skeleton.joint_limits}
         self._limits_deg = np.rad2deg([limits.get(name, (np.nan, np.nan)) for name in ANGLES])
         self._wrist_from_grip = {
-            side: np.array([*grip.position, *grip.orientation]) for side, grip in wrist_from_grip.items()
+            side: np.array([*grip.position, *grip.orientation]) for side, grip in grips_of(skeleton).items()
         }
 
     def send(self, rows: Rows) -> None:

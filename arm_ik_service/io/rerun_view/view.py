@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
@@ -19,15 +19,11 @@ from arm_ik_service.io.rerun_view.props import Box
 from arm_ik_service.io.rerun_view.rows import Rows
 from arm_ik_service.io.rerun_view.sinks import Save, Sink, attach, first_line
 from arm_ik_service.io.rerun_view.skinned import Skin
-from arm_ik_service.wire.messages import ArmsState, ControllerFrame, Pose, Side, Skeleton
+from arm_ik_service.wire.messages import ArmsState, ControllerFrame, Pose, Skeleton
 
 APPLICATION = "arm_ik"
 CLOSE_WITHIN_S = 5.0
 BATCH_ROWS = 512  # offline: rows gathered before they are sent; a call then costs nothing a row
-OPENXR_GRIP: dict[Side, Pose] = {  # wrist_from_grip of DESIGN section 2
-    "left": Pose((0.0, -0.02, -0.075), (0.5, -0.5, -0.5, 0.5)),
-    "right": Pose((0.0, -0.02, -0.075), (0.5, 0.5, 0.5, 0.5)),
-}
 LEGEND = """\
 **Sleeves, plots**: left blue, right orange. **Dark red**: joint limits. **White controller**: the pose asked for; \
 **red line**: from the hand to it. **Hands**: tracked green, inferred yellow, held pink, lost grey. \
@@ -67,21 +63,21 @@ class RerunView:
         self._skin = skin
         self._people: dict[str, _Person] = {}
         self._boxes: list[Box] = []
-        self._described: dict[str, tuple[Skeleton, Mapping[Side, Pose]]] = {}
+        self._described: dict[str, Skeleton] = {}
         if name:
             self._recording.send_recording_name(name)
         self._recording.log("/", rr.ViewCoordinates.RIGHT_HAND_Y_UP, static=True)
         self._recording.log("/legend", rr.TextDocument(LEGEND, media_type=rr.MediaType.MARKDOWN), static=True)
 
-    def describe(self, skeleton: Skeleton, wrist_from_grip: Mapping[Side, Pose] = OPENXR_GRIP) -> None:
+    def describe(self, skeleton: Skeleton) -> None:
         """Take in what does not change of an avatar: lengths, joint limits, grips. Again where that did change.
 
         An avatar that was never described has its lengths measured from its first message, and no limits in its plots.
         """
-        self._described[skeleton.avatar] = skeleton, wrist_from_grip
+        self._described[skeleton.avatar] = skeleton
         if (person := self._people.get(skeleton.avatar)) is not None:
             self._send(person)
-            person.sender.describe(skeleton, wrist_from_grip)
+            person.sender.describe(skeleton)
 
     def add(self, arms: ArmsState, frame: ControllerFrame | None) -> None:
         """Gather one answer and the frame it answers (None where that was missed: no target is drawn)."""
@@ -148,7 +144,7 @@ class RerunView:
             person.chest = Pose((x + offset, y, z), arms.chest.orientation)
         self._people[arms.avatar] = person
         log_styles(self._recording, root)
-        person.sender.describe(*self._described.get(arms.avatar, (skeleton_of(arms), OPENXR_GRIP)))
+        person.sender.describe(self._described.get(arms.avatar) or skeleton_of(arms))
         if len(self._people) > 1:
             for name, one in self._people.items():
                 log_name(self._recording, one.root, name)
@@ -169,7 +165,6 @@ def write_recording(
     answers: Iterable[tuple[ControllerFrame | None, ArmsState]],
     skeleton: Skeleton | None = None,
     *,
-    wrist_from_grip: Mapping[Side, Pose] = OPENXR_GRIP,
     name: str = "",
     skin: Skin | None = None,
 ) -> int:
@@ -177,7 +172,7 @@ def write_recording(
     count = 0
     with RerunView(Save(path), name=name, skin=skin) as view:
         if skeleton is not None:
-            view.describe(skeleton, wrist_from_grip)
+            view.describe(skeleton)
         for frame, arms in answers:
             view.add(arms, frame)
             count += 1
