@@ -16,7 +16,7 @@ from arm_ik_service.body.state import BODY
 from arm_ik_service.body.step import initialise_body, step_body
 from arm_ik_service.compiled import Record, compiled, record_dtype
 from arm_ik_service.ik.state import ARM
-from arm_ik_service.ik.step import initialise_arm, step_arm
+from arm_ik_service.ik.step import initialise_arm, show_ahead, step_arm
 from arm_ik_service.output import OUTPUT, read_output, write_output
 from arm_ik_service.settings import Settings, to_record
 from arm_ik_service.tracking.frame import FRAME, pack_frame
@@ -34,6 +34,7 @@ def step_batch(
     indices: Any,
     frames: Any,
     receive_times_ns: Any,
+    ahead_s: Any,
     verdicts: Any,
     count: int,
     tracking_settings: Record,
@@ -52,6 +53,8 @@ def step_batch(
             if row.body.learning.arms:  # nobody measured this person: their arms are as long as they turn out to be
                 arm.chain.upper_arm_m, arm.chain.forearm_m = row.body.upper_arm, row.body.forearm
             step_arm(arm, row.body.targets[side], row.tracking.dt_s, solver_settings)
+            if ahead_s[k] > 0.0:
+                show_ahead(arm, ahead_s[k])
         write_output(outputs[k], row.tracking, row.body, row.arms)
 
 
@@ -64,7 +67,9 @@ class Avatars:
         self._frames = np.zeros(batch, FRAME)
         self._indices = np.zeros(batch, np.int64)
         self._receive_times_ns = np.zeros(batch, np.int64)
+        self._ahead_s = np.zeros(batch)
         self._outputs = np.zeros(batch, OUTPUT)
+        self._predict_s = settings.solver.predict_s
         self.verdicts = np.zeros(batch, np.int64)
         self._settings = (to_record(settings.tracking), to_record(settings.body), to_record(settings.solver))
         self._models: dict[Profile, tuple[ArmModel, ArmModel]] = {}
@@ -120,9 +125,16 @@ class Avatars:
             models = self._models[profile] = (left, right)
         return models
 
-    def add(self, index: int, frame: ControllerFrame, receive_time_ns: int) -> int:
-        """Put a frame of the avatar in row `index` at the end of the batch; returns its place there."""
+    def add(self, index: int, frame: ControllerFrame, receive_time_ns: int, predict_to_ns: int | None = None) -> int:
+        """Put a frame of the avatar in row `index` at the end of the batch; returns its place there.
+
+        `predict_to_ns`, on the clock of the sample time, asks for the arms as they will be then; None takes what the
+        settings say, which is no prediction unless they do.
+        """
         place = self.count
+        self._ahead_s[place] = (
+            self._predict_s if predict_to_ns is None else 1e-9 * (predict_to_ns - frame.sample_time_ns)
+        )
         pack_frame(frame, self._frames, place)
         self._indices[place] = index
         self._receive_times_ns[place] = receive_time_ns
@@ -137,6 +149,7 @@ class Avatars:
             self._indices,
             self._frames,
             self._receive_times_ns,
+            self._ahead_s,
             self.verdicts,
             self.count,
             *self._settings,
@@ -181,13 +194,15 @@ class Avatar:
         self._avatars = Avatars(settings)
         self._avatars.reset(0, profile or Profile())
 
-    def step(self, frame: ControllerFrame, now_ns: int) -> ArmsState | None:
+    def step(self, frame: ControllerFrame, now_ns: int, predict_to_ns: int | None = None) -> ArmsState | None:
         """Solve both arms for one frame received at `now_ns`; None where the frame is refused (late or repeated).
 
-        The two times that only a service can measure, solving and publishing, are 0 in the message.
+        `predict_to_ns`, on the clock of the sample time and at most 0.1 s after it, moves the arms on by their joint
+        velocities to that time; chest and shoulders stay, and the residual holds the way that was added. The two times
+        that only a service can measure, solving and publishing, are 0 in the message.
         """
         avatars = self._avatars
-        avatars.add(0, frame, now_ns)
+        avatars.add(0, frame, now_ns, predict_to_ns)
         avatars.step()
         if avatars.verdicts[0] != ACCEPTED:
             return None

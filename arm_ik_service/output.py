@@ -89,7 +89,7 @@ def write_output(out: Record, tracking: Record, body: Record, arms: Any) -> None
         written.orientation_error_rad = g.norm(
             g.log(g.multiply(g.conjugate(g.quaternion(asked.rotation)), hand_rotation))
         )
-        written.configuration[:] = arm.configuration
+        written.configuration[:] = arm.published
         written.velocity[:] = arm.velocity
         written.angles[:] = arm.angles
         written.angle_rates[:] = arm.angle_rates

@@ -48,6 +48,8 @@ class SolverSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     orientation_tolerance_rad: Annotated[float, Meta(gt=0.0)] = 2e-4
     # the lever on which a radian of hand rotation weighs as much as a metre of position: a hand's length and a bit
     rotation_weight_m: Annotated[float, Meta(gt=0.0)] = 0.14
+    # publish the arms as they will be so long after the sample time: hides the way of the messages, doubles their noise
+    predict_s: Annotated[float, Meta(ge=0.0, le=0.1)] = 0.0
     swivel_speed_rad_s: Annotated[float, Meta(ge=0.0)] = 4.0  # the elbow about the arm's line, for comfort alone
     swivel_acceleration_rad_s2: Annotated[float, Meta(gt=0.0)] = 80.0  # so that joint velocities do not jump
     swivel_time_s: Annotated[float, Meta(ge=0.0)] = 0.03  # in which it covers most of the way to the comfortable place

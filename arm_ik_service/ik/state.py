@@ -29,6 +29,7 @@ ARM = record_dtype(
         ("anchor", np.float64, (10,)),  # configuration at the beginning of the frame
         # the answer; positions and rotations in the shoulder frame of the arm's own side
         ("configuration", np.float64, (10,)),
+        ("published", np.float64, (10,)),  # the configuration itself, or where its velocity leads to
         ("velocity", np.float64, (9,)),  # [rad/s], tangent order
         ("angles", np.float64, (9,)),  # arm.model.ANGLES [rad]
         ("angle_rates", np.float64, (9,)),  # [rad/s]

@@ -24,6 +24,7 @@ from arm_ik_service.ik.state import ARM, initialise_arm
 from arm_ik_service.ik.velocity import ITERATIONS, SPEED_BIT, difference, velocity_from_twist
 
 RESTS_RAD = 1e-3  # nearer to a limit than this the arm rests on it, for whoever reads the mask
+MAX_AHEAD_S = 0.1  # a constant joint velocity says nothing about later
 MIN_DT_S, MAX_DT_S = 1e-3, 0.1  # a frame's time outside this says nothing about speed
 
 
@@ -46,6 +47,15 @@ def step_arm(arm: Record, target: Record, dt_s: float, settings: Record) -> None
     linear = position_to_arm(chain, vector(target.linear_velocity))
     angular = spin_to_arm(chain, vector(target.angular_velocity))
     _move_on(arm, settings, linear, angular, dt_s)
+    for i in range(10):
+        arm.published[i] = q[i]
+    _show(arm)
+
+
+@compiled
+def show_ahead(arm: Record, ahead_s: float) -> None:
+    """Let what is read off the arm be as it will be in `ahead_s`, at most MAX_AHEAD_S; the arm itself stays."""
+    predict(arm, clip(ahead_s, 0.0, MAX_AHEAD_S), arm.published)
     _show(arm)
 
 
@@ -95,16 +105,16 @@ def limits_at(chain: Record, configuration: Any) -> int:
 
 @compiled
 def _show(arm: Record) -> None:
-    """Fill what is read off the configuration."""
+    """Fill what is read off the published configuration."""
     chain, work = arm.chain, arm.work
-    elbow, wrist, upper, lower, hand = forward(chain, arm.configuration)
+    elbow, wrist, upper, lower, hand = forward(chain, arm.published)
     store(arm.elbow, position_from_arm(chain, elbow))
     store(arm.wrist, position_from_arm(chain, wrist))
     store(arm.upper_arm_rotation, bone_from_arm(chain, upper))
     store(arm.forearm_rotation, bone_from_arm(chain, lower))
     store(arm.hand_rotation, hand_from_arm(chain, hand))
-    joint_angles(arm.configuration, arm.velocity, arm.angles, arm.angle_rates)
-    arm.isb_singular = isb_shoulder(arm.configuration, arm.isb)
+    joint_angles(arm.published, arm.velocity, arm.angles, arm.angle_rates)
+    arm.isb_singular = isb_shoulder(arm.published, arm.isb)
     arm.iterations = work.iterations
 
 
@@ -116,4 +126,4 @@ def predict(arm: Record, ahead_s: float, configuration: Any) -> None:
     move(arm.chain, configuration, arm.velocity, ahead_s)
 
 
-__all__ = ["ARM", "initialise_arm", "limits_at", "predict", "step_arm"]
+__all__ = ["ARM", "initialise_arm", "limits_at", "predict", "show_ahead", "step_arm"]

@@ -1,0 +1,99 @@
+"""One person through all stages: what goes in comes out as arms, the same each time."""
+
+from __future__ import annotations
+
+import msgspec
+import numpy as np
+import pytest
+from harness import standing
+
+from arm_ik_service import Avatar, Settings
+from arm_ik_service.io.session import open_session
+from arm_ik_service.programs.demo import bundled_session
+from arm_ik_service.wire.messages import ControllerFrame, TrackedPose
+
+
+@pytest.fixture(scope="module")
+def frames() -> list[ControllerFrame]:
+    """Five seconds of boxing."""
+    return [recorded.frame for recorded in open_session(bundled_session("boxing")).frames()][:450]
+
+
+def test_the_same_frames_give_the_same_bytes(frames: list[ControllerFrame]) -> None:
+    one, two = Avatar(), Avatar()
+    for frame in frames:
+        first, second = (avatar.step(frame, frame.sample_time_ns) for avatar in (one, two))
+        assert msgspec.msgpack.encode(first) == msgspec.msgpack.encode(second)
+
+
+def test_a_mirrored_person_moves_the_other_arm_the_same(frames: list[ControllerFrame]) -> None:
+    def mirrored(pose: TrackedPose | None) -> TrackedPose | None:
+        if pose is None:
+            return None
+        (x, y, z), (qx, qy, qz, qw) = pose.position, pose.orientation
+        return TrackedPose((-x, y, z), (qx, -qy, -qz, qw), pose.flags)
+
+    plain, mirror = Avatar(), Avatar()
+    for frame in frames:
+        seen = msgspec.structs.replace(
+            frame, head=mirrored(frame.head), left=mirrored(frame.right), right=mirrored(frame.left)
+        )
+        state, reflected = plain.step(frame, frame.sample_time_ns), mirror.step(seen, seen.sample_time_ns)
+        assert state is not None
+        assert reflected is not None
+        assert reflected.left.configuration == pytest.approx(state.right.configuration, abs=1e-6)
+        x, y, z = state.right.bones.forearm.position
+        assert reflected.left.bones.forearm.position == pytest.approx((-x, y, z), abs=1e-6)
+
+
+def test_what_is_published_hangs_together(frames: list[ControllerFrame]) -> None:
+    avatar = Avatar()
+    for frame in frames:
+        state = avatar.step(frame, frame.sample_time_ns)
+        assert state is not None
+        for arm in (state.left, state.right):
+            upper, lower, hand = (
+                np.array(bone.position) for bone in (arm.bones.upper_arm, arm.bones.forearm, arm.bones.hand)
+            )
+            reach = np.linalg.norm(lower - upper) + np.linalg.norm(hand - lower)
+            assert 0.45 < reach < 0.75
+            assert np.linalg.norm(arm.configuration[:4]) == pytest.approx(1.0)
+            assert arm.angles.elbow_flexion == arm.configuration[4]
+            assert arm.angle_rates.elbow_flexion == arm.velocity[3]
+
+
+def test_a_prediction_is_nearer_to_where_the_elbow_will_be_than_where_it_is(frames: list[ControllerFrame]) -> None:
+    ahead = 3
+    now, later = Avatar(), Avatar()
+    plain, predicted = [], []
+    for frame, then in zip(frames, frames[ahead:], strict=False):
+        one = now.step(frame, frame.sample_time_ns)
+        two = later.step(frame, frame.sample_time_ns, predict_to_ns=then.sample_time_ns)
+        assert one is not None
+        assert two is not None
+        plain.append(one.right.bones.forearm.position)
+        predicted.append(two.right.bones.forearm.position)
+    true = np.array(plain[ahead:])
+    without = np.linalg.norm(np.array(plain[:-ahead]) - true, axis=1)
+    with_it = np.linalg.norm(np.array(predicted[:-ahead]) - true, axis=1)
+    fast = without > 0.02
+    assert fast.sum() > 20
+    assert np.median(with_it[fast] / without[fast]) < 0.7
+
+
+def test_a_prediction_leaves_the_arm_itself_alone(frames: list[ControllerFrame]) -> None:
+    plain, looking_ahead = Avatar(), Avatar(settings=msgspec.convert({"solver": {"predict_s": 0.03}}, Settings))
+    for frame in frames:
+        one = plain.step(frame, frame.sample_time_ns)
+        two = looking_ahead.step(frame, frame.sample_time_ns, predict_to_ns=frame.sample_time_ns)
+        looking_ahead.step(frame, frame.sample_time_ns)  # refused as a repetition: changes nothing
+        assert one == two
+
+
+def test_a_frame_without_any_device_is_answered_with_finite_numbers_and_says_lost() -> None:
+    empty = msgspec.structs.replace(standing(0, 0), head=None, left=None, right=None)
+    state = Avatar().step(empty, 0)
+    assert state is not None
+    assert state.left.tracking == "lost"
+    assert np.isfinite(state.left.configuration).all()
+    assert state.left.bones.hand.position[1] > 0.3
