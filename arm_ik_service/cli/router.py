@@ -45,8 +45,9 @@ def router(
     options = bus_options(connect, listen, scouting, zenoh_config, tls_cert, tls_key, tls_ca, access)
     if connect and not listen:
         raise SettingsError("a router listens: say where with --listen tcp/HOST:PORT")
-    log_zenoh(denials=access is not None)
+    pass_on_log = log_zenoh(denials=access is not None)
     stopped = Event()
     with open_router(options), stopped_by_signals(stopped.set):
+        pass_on_log()
         say(f"ready: routes on {', '.join(options.listens_on()) or zenoh_config}; Ctrl-C ends it")
         stopped.wait()

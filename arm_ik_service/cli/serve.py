@@ -64,8 +64,9 @@ def serve(
     service_name = check_id(name or f"{host}-{os.getpid()}")
     options = bus_options(connect, listen, scouting, zenoh_config, tls_cert, tls_key, tls_ca, access)
     used_profile, used_settings = find_profile(profile), load_settings(settings)
-    log_zenoh(denials=access is not None)
+    pass_on_log = log_zenoh(denials=access is not None)
     with open_hub(options, waiting=say) as bus:
+        pass_on_log()
         warm_up(used_settings, say)
         from arm_ik_service.programs.service import Service
 

@@ -66,17 +66,30 @@ class _Others:
 class Inbox:
     """Keeps the newest payload of each avatar that is ours. Deaf until `hear_everybody` or `hear`."""
 
-    def __init__(self, session: zenoh.Session, keys: Keys, limits: InboxLimits, owns: Callable[[str], bool]) -> None:
-        """`owns` is asked on Zenoh's network thread, once for an avatar until `forget_owners`."""
+    def __init__(
+        self,
+        session: zenoh.Session,
+        keys: Keys,
+        limits: InboxLimits,
+        owns: Callable[[str], bool],
+        answer_now: Callable[[Arrival], bool] | None = None,
+    ) -> None:
+        """Both callables run on Zenoh's network threads.
+
+        `owns` is asked once for an avatar until `forget_owners`. `answer_now` is offered a frame before which none
+        waits, and says whether it is done with.
+        """
         self._session = session
         self._keys = keys
         self._limits = limits
         self._owns = owns
+        self._answer_now = answer_now
         self._period_ns = int(1e9 / limits.max_frames_per_s)
         self._burst_ns = int(1e9 * limits.rate_burst_s)
         self._lock = Lock()  # held for a few dictionary operations, on both sides
         self._slots: dict[str, Arrival] = {}
         self._ready: SimpleQueue[str | None] = SimpleQueue()
+        self._next: str | None = _WAKE
         self._doors: dict[str, _Door] = {}  # by key
         self._owned: dict[str, bool] = {}  # by avatar
         self._refused: dict[str, tuple[int, str]] = {}
@@ -191,16 +204,16 @@ class Inbox:
             self._refuse("too_large", f"{door.avatar}: {len(payload)} bytes", door)
             return
         avatar = door.avatar
+        arrival = Arrival(avatar, payload.to_bytes(), receive_time_ns, 0)
+        if not self._slots and self._answer_now is not None and self._answer_now(arrival):
+            return
         with self._lock:
             slot = self._slots.get(avatar)
             if slot is None:
-                self._slots[avatar] = Arrival(avatar, payload.to_bytes(), receive_time_ns, 0)
+                self._slots[avatar] = arrival
             else:
-                slot.payload, slot.receive_time_ns, slot.overtaken = (
-                    payload.to_bytes(),
-                    receive_time_ns,
-                    slot.overtaken + 1,
-                )
+                slot.payload, slot.receive_time_ns = arrival.payload, receive_time_ns
+                slot.overtaken += 1
                 return
         self._ready.put(avatar)
 
@@ -234,29 +247,33 @@ class Inbox:
 
     # --- taking; called by the loop
 
-    def take(self, timeout_s: float, most: int) -> list[Arrival] | None:
-        """Return up to `most` newest frames, waiting up to `timeout_s` for the first; None once `stop` was called.
-
-        After `wake` it returns at once, with what there is.
-        """
-        arrivals: list[Arrival] = []
+    def wait(self, timeout_s: float) -> bool:
+        """Wait up to `timeout_s` for a frame, or until `wake`; False once `stop` was called."""
         try:
-            avatar = self._ready.get(timeout=max(timeout_s, 0.0))
-            while True:
-                if avatar is None:
-                    return None
-                if avatar == _WAKE:
-                    break
+            self._next = self._ready.get(timeout=max(timeout_s, 0.0))
+        except Empty:
+            self._next = _WAKE
+        return self._next is not None
+
+    def take(self, most: int) -> list[Arrival]:
+        """Return up to `most` newest frames, the one that `wait` saw first; never waits."""
+        arrivals: list[Arrival] = []
+        avatar, self._next = self._next, _WAKE
+        while True:
+            if avatar:
                 with self._lock:
                     arrival = self._slots.pop(avatar)
                 if arrival.payload is not None:
                     arrivals.append(arrival)
                 if len(arrivals) >= most:
-                    break
+                    return arrivals
+            try:
                 avatar = self._ready.get_nowait()
-        except Empty:
-            pass
-        return arrivals
+            except Empty:
+                return arrivals
+            if avatar is None:
+                self._ready.put(None)  # for the next `wait`
+                return arrivals
 
     def refused_of(self, avatar: str) -> int:
         """Return how many of an avatar's frames were refused here."""
@@ -285,11 +302,11 @@ class Inbox:
         return refused
 
     def wake(self) -> None:
-        """Make `take` return at once; from any thread."""
+        """Make `wait` return at once; from any thread."""
         self._ready.put(_WAKE)
 
     def stop(self) -> None:
-        """Make `take` return None; safe in a signal handler."""
+        """Make `wait` return False; safe in a signal handler."""
         self._ready.put(None)
 
     def close(self) -> None:

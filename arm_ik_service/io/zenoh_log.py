@@ -12,6 +12,7 @@ import os
 import re
 import time
 from collections import Counter
+from collections.abc import Callable
 from threading import Thread
 
 import zenoh
@@ -28,21 +29,22 @@ _DENIALS = "zenoh::net::routing::interceptor=trace"
 _INTERCEPTED = "Msg intercepted!"  # follows on the same thread: somebody did try, it was not only looked up in advance
 
 
-def log_zenoh(*, denials: bool) -> None:
+def log_zenoh(*, denials: bool) -> Callable[[], None]:
     """Log Zenoh's warnings, and what access rules deny, for the rest of the process. Before the first session.
 
+    Returns what begins to pass them on, for when the session is open: if it cannot be, our own error says why.
     Where RUST_LOG is set it is left alone, and so is standard output.
     """
     if "RUST_LOG" in os.environ:
         zenoh.try_init_log_from_env()
-        return
+        return lambda: None
     os.environ.setdefault("NO_COLOR", "1")
     reading, writing = os.pipe()
     os.set_blocking(writing, False)
     os.dup2(writing, 1)
     os.close(writing)
-    Thread(target=_forward, args=(reading,), name="zenoh-log", daemon=True).start()
     zenoh.init_log_from_env_or(",".join(["warn", _NOISE, *([_DENIALS] if denials else [])]))
+    return Thread(target=_forward, args=(reading,), name="zenoh-log", daemon=True).start
 
 
 def _forward(reading: int) -> None:

@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
+from threading import Lock
 
 import msgspec
 
@@ -35,6 +36,11 @@ from arm_ik_service.wire.messages import VERSION, Health
 log = logging.getLogger("arm_ik.service")
 
 BATCH = 8  # frames solved by one call: more saves little per frame and delays the first of them
+# A frame that finds nobody at work is solved on the thread that brought it: to hand it over costs as much as a solve.
+# That thread reads no other frame meanwhile, so frames that come faster than they are answered go through the slots,
+# where the newest of each avatar wins.
+BACK_TO_BACK_NS = 50_000  # between the end of one and the next: it had been waiting
+MOST_BACK_TO_BACK = 3
 CALIBRATIONS_EVERY = 16  # look-outs: how often the others are asked for their avatars' profiles
 _profiles = msgspec.msgpack.Decoder(Profile), msgspec.json.Decoder(Profile)
 
@@ -74,6 +80,9 @@ class Service:
         self._looking_out = False
         self._look_out_at_s = float("inf")
         self._services_changed = False
+        self._working = Lock()  # held by whoever touches avatars and seats
+        self._ended_ns = 0
+        self._back_to_back = 0
         self._fleet = Fleet(session, self._keys, name, self._note_change)
         self._inbox = Inbox(
             session,
@@ -86,6 +95,7 @@ class Service:
                 rate_burst_s=limits.rate_burst_s,
             ),
             self._fleet.owns,
+            self._answer_now,
         )
         self._health = declare_stream(session, self._keys.health(name), limits.encoding)
         self._queryables = [
@@ -123,19 +133,20 @@ class Service:
         try:
             while True:
                 due_s = min(self._health_at_s, self._look_out_at_s)
-                arrivals = self._inbox.take(0.0 if self._services_changed else due_s - time.monotonic(), BATCH)
-                if arrivals is None:
+                if not self._inbox.wait(0.0 if self._services_changed else due_s - time.monotonic()):
                     return
-                if self._services_changed:
-                    self._share_out()
-                if arrivals:
-                    self._answer(arrivals)
-                now_s = time.monotonic()
-                if now_s >= self._look_out_at_s:
-                    self._look_out(now_s)
-                if now_s >= self._health_at_s:
-                    self._publish_health()
-                    gc.collect(1)
+                with self._working:
+                    if self._services_changed:
+                        self._share_out()
+                    arrivals = self._inbox.take(BATCH)
+                    if arrivals:
+                        self._answer(arrivals)
+                    now_s = time.monotonic()
+                    if now_s >= self._look_out_at_s:
+                        self._look_out(now_s)
+                    if now_s >= self._health_at_s:
+                        self._publish_health()
+                        gc.collect(1)
         finally:
             gc.enable()
             gc.unfreeze()
@@ -144,9 +155,28 @@ class Service:
         """Withdraw from the bus; the last health says what was served."""
         self._inbox.close()
         self._fleet.leave()
-        self._publish_health()
+        with self._working:
+            self._publish_health()
 
     # --- frames
+
+    def _answer_now(self, arrival: Arrival) -> bool:
+        """Run on a Zenoh thread: answer a known avatar where nobody is at work and no frame was waiting."""
+        if time.perf_counter_ns() - self._ended_ns > BACK_TO_BACK_NS:
+            self._back_to_back = 0
+        elif self._back_to_back >= MOST_BACK_TO_BACK:
+            return False
+        if not self._working.acquire(blocking=False):
+            return False
+        try:
+            if arrival.avatar not in self._seats:
+                return False  # to sit down takes declarations, which are for the loop
+            self._answer([arrival])
+            self._back_to_back += 1
+            self._ended_ns = time.perf_counter_ns()
+            return True
+        finally:
+            self._working.release()
 
     def _answer(self, arrivals: list[Arrival]) -> None:
         """Decode, solve and publish one batch; what cannot be used is counted and leaves the rest alone."""

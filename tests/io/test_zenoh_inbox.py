@@ -29,7 +29,8 @@ class Door:
     def take(self, seconds: float = 0.3) -> list[Arrival]:
         """Return what has arrived when nothing more comes."""
         time.sleep(seconds)
-        return self.inbox.take(0.0, 100) or []
+        assert self.inbox.wait(0.0)
+        return self.inbox.take(100)
 
     def refused(self) -> dict[str, int]:
         return {cause: count for cause, (count, _) in self.inbox.take_refused().items()}
@@ -116,12 +117,13 @@ def test_what_was_given_up_is_not_taken_even_if_it_had_arrived(door: Door) -> No
     assert door.inbox.take_last_answer("a") == b"answer"
 
 
-def test_taking_waits_no_longer_than_it_is_told_and_stops_when_it_is_told(door: Door) -> None:
+def test_waiting_lasts_no_longer_than_it_is_told_and_ends_when_it_is_stopped(door: Door) -> None:
     door.inbox.wake()
-    assert door.inbox.take(60.0, 1) == []
-    assert door.inbox.take(0.01, 1) == []
+    assert door.inbox.wait(60.0)
+    assert door.inbox.take(1) == []
+    assert door.inbox.wait(0.01)
     door.inbox.stop()
-    assert door.inbox.take(60.0, 1) is None
+    assert not door.inbox.wait(60.0)
 
 
 def test_whoever_is_silent_is_forgotten(door: Door) -> None:
