@@ -38,7 +38,7 @@ class NoAvatars(Avatars):
         """There is nobody."""
         return False
 
-    def add(self, index: int, frame: ControllerFrame, receive_time_ns: int) -> int:
+    def add(self, index: int, frame: ControllerFrame, receive_time_ns: int, predict_to_ns: int | None = None) -> int:
         """Take a place in the batch."""
         self.count += 1
         return self.count - 1

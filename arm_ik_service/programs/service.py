@@ -41,7 +41,9 @@ BATCH = 8  # frames solved by one call: more saves little per frame and delays t
 # where the newest of each avatar wins.
 BACK_TO_BACK_NS = 50_000  # between the end of one and the next: it had been waiting
 MOST_BACK_TO_BACK = 3
-CALIBRATIONS_EVERY = 16  # look-outs: how often the others are asked for their avatars' profiles
+# look-outs: how often the others are asked for their avatars' profiles, which may change, and how often at the most for
+# those of somebody new
+CALIBRATIONS_EVERY, NEW_CALIBRATIONS_EVERY = 16, 4
 _profiles = msgspec.msgpack.Decoder(Profile), msgspec.json.Decoder(Profile)
 
 
@@ -309,7 +311,10 @@ class Service:
         else:
             self._inbox.look_out()
             self._look_out_at_s = now_s + self._limits.look_out_s
-            if self._look_outs % CALIBRATIONS_EVERY == 0:
+            somebody_new = self._look_outs % NEW_CALIBRATIONS_EVERY == 0 and any(
+                avatar not in self._others_profiles for avatar in self._inbox.others()
+            )
+            if somebody_new or self._look_outs % CALIBRATIONS_EVERY == 0:
                 self._ask_for_calibrations()
             self._look_outs += 1
         self._looking_out = not self._looking_out

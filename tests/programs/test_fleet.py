@@ -7,6 +7,7 @@ import time
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import ExitStack
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -48,8 +49,9 @@ def test_people_are_shared_evenly() -> None:
 class Fleet:
     """Two services that know each other, and a client of both that sends for everybody."""
 
-    def __init__(self, stack: ExitStack) -> None:
+    def __init__(self, stack: ExitStack, arguments: dict[str, list[str]] | None = None) -> None:
         self._stack = stack
+        self._arguments = arguments or {}
         self.endpoints = {"first": free_endpoint(), "second": free_endpoint()}
         self.services = {name: self.serve(name) for name in self.endpoints}
         for service in self.services.values():
@@ -68,7 +70,8 @@ class Fleet:
 
     def serve(self, name: str) -> Running:
         other = next(endpoint for who, endpoint in self.endpoints.items() if who != name)
-        service = Running("serve", "--name", name, "--listen", self.endpoints[name], "--connect", other)
+        more = self._arguments.get(name, [])
+        service = Running("serve", "--name", name, "--listen", self.endpoints[name], "--connect", other, *more)
         self._stack.callback(self._end, service)
         return service
 
@@ -158,6 +161,20 @@ def test_whoever_comes_late_is_told_everybodys_last_answer_by_whichever_service_
     assert set(last) == {KEYS.arms(name) for name in PEOPLE}
     assert wait_for(lambda: all(state.seq <= fleet.seq for state in last.values()))
     assert {key for key, _ in query(fleet.bus, KEYS.skeleton())} == {KEYS.skeleton(name) for name in PEOPLE}
+
+
+def test_a_calibration_moves_along_with_the_person(tmp_path: Path) -> None:
+    profile = tmp_path / "tall.toml"
+    profile.write_text("[body]\nstature_m = 1.97\nupper_arm_m = 0.41\n")
+    with ExitStack() as stack:
+        fleet = Fleet(stack, {"first": ["--profile", str(profile)]})
+        fleet.send_until_settled({"first", "second"})
+        time.sleep(2.0)  # somebody new's calibration is asked for within a second
+        fleet.services["first"].popen.kill()
+        fleet.send_until_settled({"second"})
+        skeletons = {key: codec.skeletons.decode(payload) for key, payload in query(fleet.bus, KEYS.skeleton())}
+    tall = {KEYS.avatar_of(key) for key, skeleton in skeletons.items() if skeleton.upper_arm_m == 0.41}
+    assert tall == {name for name in PEOPLE if owner_of(name, {"first", "second"}) == "first"}
 
 
 def test_a_second_service_of_the_same_name_is_refused_with_one_line(fleet: Fleet) -> None:
