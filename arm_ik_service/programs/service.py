@@ -25,6 +25,7 @@ from arm_ik_service.errors import DecodeError, ModelError, ProfileError, Version
 from arm_ik_service.io.zenoh_inbox import Arrival, Inbox, InboxLimits
 from arm_ik_service.io.zenoh_streams import Bus, answer_queries, declare_stream, put_once, query_later
 from arm_ik_service.programs.fleet import Fleet
+from arm_ik_service.programs.rehearsal import Rehearsal
 from arm_ik_service.programs.seats import Latencies, Seat
 from arm_ik_service.settings import Settings
 from arm_ik_service.skeleton import skeleton_of
@@ -41,6 +42,7 @@ BATCH = 8  # frames solved by one call: more saves little per frame and delays t
 # where the newest of each avatar wins.
 BACK_TO_BACK_NS = 50_000  # between the end of one and the next: it had been waiting
 MOST_BACK_TO_BACK = 3
+SPEAKING_S = 0.5  # after its last frame somebody is expected to send another
 # look-outs: how often the others are asked for their avatars' profiles, which may change, and how often at the most for
 # those of somebody new
 CALIBRATIONS_EVERY, NEW_CALIBRATIONS_EVERY = 16, 4
@@ -83,7 +85,9 @@ class Service:
         self._look_out_at_s = float("inf")
         self._services_changed = False
         self._working = Lock()  # held by whoever touches avatars and seats
-        self._ended_ns = 0
+        self._ended_ns = 0  # when the last frame was answered
+        # who stands in for our avatars does so to see what the rest costs
+        self._rehearsal = Rehearsal(settings, profile) if avatars is None and limits.rehearse_every_s else None
         self._back_to_back = 0
         self._fleet = Fleet(session, self._keys, name, self._note_change)
         self._inbox = Inbox(
@@ -134,8 +138,7 @@ class Service:
         gc.disable()
         try:
             while True:
-                due_s = min(self._health_at_s, self._look_out_at_s)
-                if not self._inbox.wait(0.0 if self._services_changed else due_s - time.monotonic()):
+                if not self._inbox.wait(self._idle_for_s()):
                     return
                 with self._working:
                     if self._services_changed:
@@ -143,6 +146,7 @@ class Service:
                     arrivals = self._inbox.take(BATCH)
                     if arrivals:
                         self._answer(arrivals)
+                        self._ended_ns = time.perf_counter_ns()
                     now_s = time.monotonic()
                     if now_s >= self._look_out_at_s:
                         self._look_out(now_s)
@@ -152,6 +156,22 @@ class Service:
         finally:
             gc.enable()
             gc.unfreeze()
+
+    def _idle_for_s(self) -> float:
+        """For how long there is nothing to do but to wait for frames; rehearses first if that is due."""
+        if self._services_changed:
+            return 0.0
+        due_s = min(self._health_at_s, self._look_out_at_s) - time.monotonic()
+        if self._rehearsal is None:
+            return due_s
+        every_s = self._limits.rehearse_every_s
+        quiet_s = (time.perf_counter_ns() - self._ended_ns) / 1e9
+        if quiet_s > SPEAKING_S:
+            return due_s  # whoever begins to speak wakes us, and is not known yet
+        if quiet_s > every_s:
+            self._rehearsal.run()
+            return min(due_s, every_s)
+        return min(due_s, every_s - quiet_s)
 
     def close(self) -> None:
         """Withdraw from the bus; the last health says what was served."""
