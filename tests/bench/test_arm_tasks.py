@@ -40,6 +40,7 @@ def test_fewer_frames_are_the_middle_of_the_session(capture: Path) -> None:
     np.testing.assert_allclose(middle.targets, whole.targets[50:70], atol=2e-4)  # lengths are means of what is read
 
 
+@pytest.mark.slow
 def test_a_session_without_truth_gives_what_the_pipeline_asks_and_no_elbow(headset_session: Path) -> None:
     for task in read_tasks(headset_session, 40):
         assert task.elbow is None

@@ -15,6 +15,7 @@ from arm_ik_service.errors import SettingsError
 SOLVERS = ["--solver", "jacobian_transpose", "--solver", "damped_least_squares:damping=fixed"]
 
 
+@pytest.mark.slow
 def test_the_table_has_a_row_for_every_solver_and_the_person(capture: Path) -> None:
     outcome = CliRunner().invoke(app, ["bench", "solvers", str(capture), *SOLVERS, "--frames", "20"])
     assert outcome.exit_code == 0, outcome.output

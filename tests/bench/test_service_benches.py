@@ -27,6 +27,7 @@ def measured(avatars: int, share: float = 1.0, service_ms: float = 1.0, client_m
     return Measured(avatars, 100, share, share, share, service_ms, service_ms, client_ms, client_ms, client_ms, 0)
 
 
+@pytest.mark.slow
 def test_latency_answers_every_frame_and_every_echo() -> None:
     found = bench("latency", "--frames", "60")
     for line in ("service", "echo"):
@@ -37,6 +38,7 @@ def test_latency_answers_every_frame_and_every_echo() -> None:
     assert found["p50_ratio"] == found["service"]["p50_ms"] / found["echo"]["p50_ms"]  # type: ignore[index]
 
 
+@pytest.mark.slow
 def test_a_soak_tells_shares_times_and_memory() -> None:
     found = bench("soak", "--avatars", "5", "--seconds", "4")
     inner = found["measured"]

@@ -142,7 +142,7 @@ def test_two_services_share_people_survive_a_kill_and_take_back_only_their_share
     assert any("taken over" in line for line in fleet.services["second"].lines)
     after = {a.avatar: a.right.bones.forearm.position for a in fleet.answers}
     for name in PEOPLE:  # the same pose is asked for: an elbow that stays was carried over
-        assert np.linalg.norm(np.subtract(after[name], elbow_before[name])) < 0.01
+        assert np.linalg.norm(np.subtract(after[name], elbow_before[name])) < 0.03
 
     back = fleet.serve("first")
     back.wait_ready()
@@ -155,6 +155,7 @@ def test_two_services_share_people_survive_a_kill_and_take_back_only_their_share
     fleet.send_until_all_are_answered()
 
 
+@pytest.mark.slow
 def test_whoever_comes_late_is_told_everybodys_last_answer_by_whichever_service_has_it(fleet: Fleet) -> None:
     fleet.send_until_settled({"first", "second"})
     last = {key: codec.arms_states.decode(payload) for key, payload in query(fleet.bus, KEYS.arms())}
@@ -184,6 +185,7 @@ def test_a_second_service_of_the_same_name_is_refused_with_one_line(fleet: Fleet
     assert "'second'" in twin.lines[-1]
 
 
+@pytest.mark.slow
 def test_services_and_headsets_that_only_connect_meet_at_a_router() -> None:
     endpoint = free_endpoint()
     router = Running("router", "--listen", endpoint)

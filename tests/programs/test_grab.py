@@ -84,6 +84,7 @@ def test_it_is_the_same_every_time() -> None:
     assert [m.arms for m in again] == [m.arms for m in performance()[:200]]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("when", ["reach", "place"])
 def test_a_cube_that_is_put_elsewhere_is_followed(when: str) -> None:
     scene, elsewhere = Scene(CUBE, GOAL), np.array([0.9, 1.1, -1.0, 0.0, 0.0, 0.0, 1.0])
@@ -99,6 +100,7 @@ def test_a_cube_that_is_put_elsewhere_is_followed(when: str) -> None:
     np.testing.assert_allclose(moment.cube[:3], GOAL, atol=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SOLVERS)
 def test_every_solver_drives_it(name: str) -> None:
     moments = list(Scene(np.array([0.25, 1.2, -0.7]), choice=SolverChoice(name, {})).moments(2.2))

@@ -121,7 +121,7 @@ def test_ten_thousand_hostile_payloads_are_counted_and_cost_another_avatar_nothi
         for payload in payloads[seq * each : (seq + 1) * each]:
             hostile.put(payload)
         time.sleep(0.01)
-    answered = service.take(10_000, 3.0)
+    answered = service.take(10_000, 1.5)
     assert [answer.seq for answer in answered if answer.avatar == "good"] == list(range(200))
     assert all(abs(x) < 100.0 for answer in answered for x in answer.left.bones.hand.position)
     health = service.healths[-1]

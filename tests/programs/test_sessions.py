@@ -17,7 +17,7 @@ from arm_ik_service.io.recording import RecordingWriter
 from arm_ik_service.io.session import open_session
 from arm_ik_service.programs.demo import bundled_session, free_endpoint
 
-FAST = ["--speed", "3"]  # what the tests need is the frames, not the minutes
+FAST = ["--speed", "6"]  # what the tests need is the frames, not the minutes
 
 
 def arm_ik(*arguments: str) -> subprocess.CompletedProcess[str]:
@@ -50,7 +50,7 @@ def test_a_replay_is_answered_frame_by_frame_recorded_as_it_was_and_solved_again
     frames = json.loads(played.stdout)["frames"]
     answers = service.take(frames, 3.0)
     assert recorder.end(signal.SIGINT) == 0
-    assert len(answers) >= 0.98 * frames  # at three times the recorded pace, on a machine that does other things
+    assert len(answers) >= 0.98 * frames  # at six times the recorded pace, on a machine that does other things
     assert len({answer.seq for answer in answers}) == len(answers)
 
     original = {recorded.frame.seq: recorded.frame for recorded in open_session(recording).frames()}
@@ -76,22 +76,22 @@ def test_killing_every_other_program_leaves_the_service_answering_and_a_log_that
     ]
     for process in doomed[1:]:
         process.wait_ready()
-    player = Running("replay", str(recording), "--to", "5", *connect)
-    assert wait_for(lambda: service.answers.qsize() > 300, 20.0)
+    player = Running("replay", str(recording), "--to", "4", *connect)
+    assert wait_for(lambda: service.answers.qsize() > 200, 20.0)
     for process in doomed:
         process.popen.kill()
         process.popen.wait()
-        time.sleep(0.3)
+        time.sleep(0.2)
     assert player.finish() == 0
     own = [answer for answer in service.take(10_000, 0.5) if answer.avatar != "other"]
     sent = sum(recorded.frame.seq <= own[-1].seq for recorded in open_session(recording).frames())
-    assert sent > 300
+    assert sent > 200
     assert len(own) >= 0.98 * sent
     assert service.process.popen.poll() is None
 
-    played = arm_ik("replay", str(log), "--speed", "5", "--avatar", "again", "--json", *connect)
+    played = arm_ik("replay", str(log), "--speed", "20", "--avatar", "again", "--json", *connect)
     assert played.returncode == 0, played.stderr
-    assert json.loads(played.stdout)["frames"] > 100
+    assert json.loads(played.stdout)["frames"] > 60
 
 
 def test_a_replay_started_before_the_service_waits_and_then_plays(recording: Path) -> None:
