@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from harness import standing
 
-from arm_ik_service import Avatar, Settings
+from arm_ik_service import Avatar, Avatars, Profile, Settings
 from arm_ik_service.io.session import open_session
 from arm_ik_service.programs.demo import bundled_session
 from arm_ik_service.wire.messages import ControllerFrame, TrackedPose
@@ -24,6 +24,23 @@ def test_the_same_frames_give_the_same_bytes(frames: list[ControllerFrame]) -> N
     for frame in frames:
         first, second = (avatar.step(frame, frame.sample_time_ns) for avatar in (one, two))
         assert msgspec.msgpack.encode(first) == msgspec.msgpack.encode(second)
+
+
+def test_a_row_that_another_person_left_is_as_good_as_new(frames: list[ControllerFrame]) -> None:
+    fresh, used = Avatars(), Avatars()
+    used.reset(0, Profile())
+    for frame in frames:
+        used.add(0, frame, frame.sample_time_ns)
+        used.step()
+    for avatars in (fresh, used):
+        avatars.reset(0, Profile())
+    for frame in frames[:3]:
+        answers = []
+        for avatars in (fresh, used):
+            avatars.add(0, frame, frame.sample_time_ns)
+            avatars.step()
+            answers.append(msgspec.msgpack.encode(avatars.answer(0, frame, "one", 0)))
+        assert answers[0] == answers[1]
 
 
 def test_a_mirrored_person_moves_the_other_arm_the_same(frames: list[ControllerFrame]) -> None:

@@ -53,17 +53,12 @@ ARM = record_dtype(
 
 def initialise_arm(arm: Record, model: ArmModel) -> None:
     """Put an ARM record of a person's arm at rest, without a past."""
-    arm["started"] = 0
+    for name in ARM.names or ():
+        arm[name] = np.zeros((), ARM[name])
     arm["chain"] = model.chains[0]
     arm["comfort"] = list(COMFORT.values())
     arm["configuration"] = model.rest
     arm["before"] = model.rest
-    arm["velocity"] = 0.0
-    arm["recent_velocity"] = 0.0
-    arm["swivel_speed"] = 0.0
-    arm["habit"] = 0.0
-    arm["work"]["position_error_m"] = 0.0
-    arm["escape"] = 0.0
 
 
 def new_arm(model: ArmModel) -> npt.NDArray[Any]:

@@ -43,7 +43,11 @@ class Recorder:
         self._writer = RecordingWriter(path, keys=keys)
         self._subscribers = [
             subscribe(bus, key, lambda *arrival, kind=kind: self._queue.put((kind, *arrival)))
-            for kind, key in (("controllers", keys.controllers()), ("arms", keys.arms()))
+            for kind, key in (
+                ("controllers", keys.controllers()),
+                ("arms", keys.arms()),
+                ("calibration", keys.calibration()),
+            )
         ]
 
     def stop(self) -> None:
@@ -79,6 +83,8 @@ class Recorder:
             if kind == "controllers":
                 self._writer.write_frame(avatar, codec.controller_frames.decode(payload), receive_time_ns)
                 self._recorded.frames += 1
+            elif kind == "calibration":
+                self._writer.write_calibration(avatar, payload, receive_time_ns)
             else:
                 self._writer.write_arms(avatar, codec.arms_states.decode(payload), receive_time_ns)
                 self._recorded.answers += 1

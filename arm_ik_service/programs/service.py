@@ -23,7 +23,7 @@ from arm_ik_service.avatar import Avatars
 from arm_ik_service.body.profile import Profile
 from arm_ik_service.errors import DecodeError, ModelError, ProfileError, VersionError, WireError
 from arm_ik_service.io.zenoh_inbox import Arrival, Inbox, InboxLimits
-from arm_ik_service.io.zenoh_streams import Bus, answer_queries, declare_stream, put_once, query_later
+from arm_ik_service.io.zenoh_streams import Bus, answer_queries, declare_stream, put_once, query_later, subscribe
 from arm_ik_service.programs.fleet import Fleet
 from arm_ik_service.programs.rehearsal import Rehearsal
 from arm_ik_service.programs.seats import Latencies, Seat
@@ -112,6 +112,7 @@ class Service:
                 (self._keys.arms(), (self._keys.arms, lambda seat: seat.last_payload)),
             )
         ]
+        self._calibrations = subscribe(session, self._keys.calibration(), self._take_calibration)
         self._join()
         # what was built so far stays: to walk through it again would stall frames for tens of milliseconds
         gc.collect()
@@ -351,6 +352,31 @@ class Service:
             self._others_profiles[avatar] = _profiles[payload[:1] == b"{"].decode(payload)
         except (msgspec.MsgspecError, UnicodeDecodeError):
             log.warning("avatar %s: a calibration that cannot be read", avatar)
+
+    def _take_calibration(self, key: str, payload: bytes, _time_ns: int) -> None:
+        """Run on a Zenoh thread: somebody was measured; from the next frame on they have these measures."""
+        avatar = self._keys.avatar_of(key)
+        with self._working:
+            seat = self._seats.get(avatar)
+            if seat is None:
+                self._note_calibration(key, payload)
+                return
+            try:
+                profile = _profiles[payload[:1] == b"{"].decode(payload)
+            except (msgspec.MsgspecError, UnicodeDecodeError) as error:
+                self._refuse("calibration", f"{avatar}: {error}", seat)
+                return
+            try:
+                self._avatars.reset(seat.index, profile)
+            except (ModelError, ProfileError) as error:
+                self._refuse("calibration", f"{avatar}: {error}", seat)
+                self._avatars.reset(seat.index, seat.profile)
+                return
+            seat.profile = profile
+            log.info("avatar %s: measured anew", avatar)
+            if seat.last_state is not None:
+                self._avatars.resume(seat.index, seat.last_state)
+            put_once(self._session, self._keys.skeleton(avatar), self._skeleton(seat), self._limits.encoding)
 
     # --- what is told
 

@@ -7,10 +7,13 @@ import os
 import subprocess
 from pathlib import Path
 
+import numpy as np
 import pytest
-from harness import COMMAND
+from harness import COMMAND, KEYS, Running, Service, wait_for
 
+from arm_ik_service.io.zenoh_streams import put_once, query
 from arm_ik_service.programs.demo import bundled_session
+from arm_ik_service.wire import codec
 
 
 def arm_ik(*arguments: str, profiles: Path) -> subprocess.CompletedProcess[str]:
@@ -33,6 +36,27 @@ def test_a_person_is_measured_from_movement_and_saved_by_name_for_every_command(
     unknown = arm_ik("solve", session, "-o", str(tmp_path / "out.npz"), "--profile", "bert", profiles=tmp_path)
     assert unknown.returncode == 2
     assert "anna" in unknown.stderr
+
+
+def test_a_live_calibration_is_taken_over_by_the_running_service(service: Service, tmp_path: Path) -> None:
+    player = Running("replay", str(bundled_session("boxing")), "--avatar", "anna", "--connect", service.endpoint)
+    before = service.take(1)[0]
+    live = ["calibrate", "--avatar", "anna", "--seconds", "6", "--json", "--connect", service.endpoint]
+    found = arm_ik(*live, profiles=tmp_path)
+    assert found.returncode == 0, found.stderr
+    measured = json.loads(found.stdout)["profile"]["body"]
+    assert service.process.says("measured anew")
+    service.take(10_000, 0.3)
+    (after,) = service.take(1)
+    skeleton = codec.skeletons.decode(dict(query(service.bus, KEYS.skeleton("anna")))[KEYS.skeleton("anna")])
+    assert skeleton.upper_arm_m == pytest.approx(measured["upper_arm_m"])
+    bones = after.right.bones
+    length = np.linalg.norm(np.subtract(bones.forearm.position, bones.upper_arm.position))
+    assert length == pytest.approx(measured["upper_arm_m"], abs=1e-6)
+    assert after.seq > before.seq
+    put_once(service.bus, KEYS.calibration("anna"), b'{"body": {"stature_m": 17}}', "json")
+    assert wait_for(lambda: service.healths[-1].refused.get("calibration") == 1, 3.0)
+    assert player.end() == 0
 
 
 def test_a_t_pose_that_is_none_is_refused_with_what_is_seen_instead(tmp_path: Path) -> None:
