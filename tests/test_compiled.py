@@ -1,0 +1,42 @@
+"""What is cached on disk is never older than the sources it was compiled from."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import arm_ik_service
+
+PROGRAM = (
+    "from arm_ik_service.arm.model import ArmModel; print(ArmModel.load().forward(ArmModel.load().rest)['wrist'][1])"
+)
+
+
+def test_an_edit_in_a_function_that_another_file_calls_is_seen(tmp_path: Path) -> None:
+    package = tmp_path / "arm_ik_service"
+    shutil.copytree(Path(arm_ik_service.__file__).parent, package, ignore=shutil.ignore_patterns("__pycache__"))
+    for folder in ("models", "replay_logs"):
+        if not (package / folder).is_dir():
+            shutil.copytree(Path(arm_ik_service.__file__).parent.parent / folder, tmp_path / folder)
+
+    def wrist_height() -> float:
+        environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
+        environment.pop("NUMBA_CACHE_DIR", None)
+        result = subprocess.run(
+            [sys.executable, "-c", PROGRAM], capture_output=True, text=True, env=environment, cwd=tmp_path, check=True
+        )
+        return float(result.stdout)
+
+    first = wrist_height()
+    assert wrist_height() == first
+    scalar = package / "geometry" / "scalar.py"
+    source = scalar.read_text()
+    edited = source.replace(
+        "    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])", "    return (a[0] + b[0], a[1] + b[1] + 1.0, a[2] + b[2])"
+    )
+    assert edited != source
+    scalar.write_text(edited)
+    assert wrist_height() != first
