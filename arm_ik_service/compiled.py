@@ -27,7 +27,7 @@ def compiled(function: Function) -> Function:
     """Compile `function` with numba on first use: cached on disk, GIL released, IEEE division as numpy does it."""
     dispatcher = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
     with suppress(AttributeError):  # plain Python under NUMBA_DISABLE_JIT; a private name, should numba rename it
-        index = dispatcher._cache._cache_file
+        index = cast(Any, dispatcher)._cache._cache_file
         index._source_stamp = (index._source_stamp, _sources())
     return cast(Function, dispatcher)
 

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from arm_ik_service.arm.model import LIMITS
 from arm_ik_service.compiled import Record, compiled, record_dtype
 from arm_ik_service.geometry import scalar as g
-from arm_ik_service.arm.model import LIMITS
 from arm_ik_service.wire.messages import (
     VERSION,
     ArmsState,

@@ -38,7 +38,24 @@ app = typer.Typer(
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (demo, serve, replay, record, view, solve, check, calibrate, convert, export, schema, router, certificates, top, doctor, grab):
+for command in (
+    demo,
+    serve,
+    replay,
+    record,
+    view,
+    solve,
+    check,
+    calibrate,
+    convert,
+    export,
+    schema,
+    router,
+    certificates,
+    top,
+    doctor,
+    grab,
+):
     app.command()(command)
 app.add_typer(bench)
 app.add_typer(bridge, name="bridge")

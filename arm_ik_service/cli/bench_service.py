@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from arm_ik_service.bench.capacity import Step
     from arm_ik_service.bench.load import Measured
 
+__all__ = ["bench"]  # with the commands below
+
 Rate = Annotated[float, typer.Option("--rate", min=1.0, max=1000.0, metavar="HZ", help="Frames a second and person.")]
 
 

@@ -31,9 +31,7 @@ def calibrate(
     session: Annotated[
         Path | None, typer.Argument(metavar="[SESSION]", help="A recording; without one, the person who is live.")
     ] = None,
-    pose: Annotated[
-        Pose, typer.Option(help="What the person does: stands in a pose, or just moves about.")
-    ] = "moving",
+    pose: Annotated[Pose, typer.Option(help="What the person does: stands in a pose, or just moves about.")] = "moving",
     avatar: Annotated[
         str | None, typer.Option(help="Whose controllers to listen to, or to take of a recording.")
     ] = None,

@@ -177,7 +177,7 @@ def twist_y(q: Quaternion) -> float:
 
 @compiled
 def heading(q: Quaternion) -> Vector:
-    """Horizontal direction that -z, the front of an OpenXR pose, faces; of unit length at any pitch, short with roll."""
+    """Horizontal direction that the front of an OpenXR pose, -z, faces; unit length at any pitch, short with roll."""
     z, y = rotate(q, Z), rotate(q, Y)
     return (z[1] * y[0] - y[1] * z[0], 0.0, z[1] * y[2] - y[1] * z[2])
 
