@@ -26,6 +26,8 @@ from arm_ik_service.errors import BridgeError
 from arm_ik_service.io.session import open_session
 from arm_ik_service.wire.messages import ControllerFrame, Space, TrackedPose
 
+pytestmark = pytest.mark.slow  # real processes, one after the other: the default run has three minutes
+
 pytest.importorskip("xr", reason="needs the extra openxr, and libGL for it")
 
 RATE_HZ = 200.0

@@ -23,6 +23,8 @@ pytest.importorskip("aiohttp", reason="needs the extra web")
 import aiohttp
 from bridges.pages import CODE, Hub, Page, Served, heard, start_web_bridge, with_page
 
+pytestmark = pytest.mark.slow  # real processes, one after the other: the default run has three minutes
+
 
 def pose(x: float, **more: Any) -> dict[str, Any]:
     return {"position": [x, 1.1, -0.3], "orientation": [0.0, 0.0, 0.0, 1.0], "flags": 15, **more}

@@ -31,6 +31,8 @@ from arm_ik_service.programs.sinks import VmcSink
 from arm_ik_service.wire.codec import encode
 from arm_ik_service.wire.messages import ArmsState, ControllerFrame
 
+pytestmark = pytest.mark.slow  # real processes, one after the other: the default run has three minutes
+
 Heard = SimpleQueue[tuple[str, Any]]
 
 

@@ -22,6 +22,8 @@ from arm_ik_service.programs.fleet import owner_of
 from arm_ik_service.wire import codec
 from arm_ik_service.wire.messages import ArmsState, Health
 
+pytestmark = pytest.mark.slow  # real processes, one after the other: the default run has three minutes
+
 ids = st.text("abcdefghijklmnopqrstuvwxyz0123456789-_", min_size=1, max_size=12)
 PEOPLE = [f"person-{n}" for n in range(12)]
 PERIOD_NS = 11_111_111
@@ -155,7 +157,6 @@ def test_two_services_share_people_survive_a_kill_and_take_back_only_their_share
     fleet.send_until_all_are_answered()
 
 
-@pytest.mark.slow
 def test_whoever_comes_late_is_told_everybodys_last_answer_by_whichever_service_has_it(fleet: Fleet) -> None:
     fleet.send_until_settled({"first", "second"})
     last = {key: codec.arms_states.decode(payload) for key, payload in query(fleet.bus, KEYS.arms())}
@@ -185,7 +186,6 @@ def test_a_second_service_of_the_same_name_is_refused_with_one_line(fleet: Fleet
     assert "'second'" in twin.lines[-1]
 
 
-@pytest.mark.slow
 def test_services_and_headsets_that_only_connect_meet_at_a_router() -> None:
     endpoint = free_endpoint()
     router = Running("router", "--listen", endpoint)

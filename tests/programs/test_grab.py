@@ -23,6 +23,8 @@ from arm_ik_service.programs.grab.walk import CYCLE_M, SPEED_M_S, Walker, cycle
 from arm_ik_service.wire import codec
 from arm_ik_service.wire.keys import Keys
 
+pytestmark = pytest.mark.slow  # real processes, one after the other: the default run has three minutes
+
 Floats = npt.NDArray[np.float64]
 CUBE, GOAL = np.array([0.4, 1.2, -1.7]), np.array([-0.8, 0.6, -1.4])
 
@@ -84,7 +86,6 @@ def test_it_is_the_same_every_time() -> None:
     assert [m.arms for m in again] == [m.arms for m in performance()[:200]]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("when", ["reach", "place"])
 def test_a_cube_that_is_put_elsewhere_is_followed(when: str) -> None:
     scene, elsewhere = Scene(CUBE, GOAL), np.array([0.9, 1.1, -1.0, 0.0, 0.0, 0.0, 1.0])
@@ -100,7 +101,6 @@ def test_a_cube_that_is_put_elsewhere_is_followed(when: str) -> None:
     np.testing.assert_allclose(moment.cube[:3], GOAL, atol=0.01)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", SOLVERS)
 def test_every_solver_drives_it(name: str) -> None:
     moments = list(Scene(np.array([0.25, 1.2, -0.7]), choice=SolverChoice(name, {})).moments(2.2))

@@ -17,6 +17,8 @@ from arm_ik_service.io.zenoh_streams import Bus, declare_stream, living, query, 
 from arm_ik_service.programs.demo import free_endpoint
 from arm_ik_service.wire import codec
 
+pytestmark = pytest.mark.slow  # real processes, one after the other: the default run has three minutes
+
 FRAMES = 10
 
 

@@ -13,12 +13,13 @@ from arm_ik_service.programs.top import rows_of
 from arm_ik_service.wire import codec
 from arm_ik_service.wire.messages import VERSION, AvatarHealth, Health
 
+pytestmark = pytest.mark.slow  # real processes, one after the other: the default run has three minutes
+
 
 def arm_ik(*arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([*COMMAND, *arguments], capture_output=True, text=True, timeout=120)
 
 
-@pytest.mark.slow
 def test_top_shows_every_service_and_avatar_and_tells_a_machine_the_same(service: Service) -> None:
     service.stream("lefty").put(codec.encode(standing(0, 0)))
     assert len(service.take(1)) == 1

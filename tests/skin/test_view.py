@@ -19,6 +19,8 @@ from arm_ik_service.skin.mesh import Floats
 from arm_ik_service.skin.puppet import Puppet, poses_of
 from arm_ik_service.wire.messages import SIDES
 
+pytestmark = pytest.mark.slow  # real processes, one after the other: the default run has three minutes
+
 ROOT = "/avatar/ann"
 
 
