@@ -16,14 +16,13 @@ import numpy as np
 import numpy.typing as npt
 
 from arm_ik_service.arm.model import ArmModel
-from arm_ik_service.body.profile import Profile
 from arm_ik_service.body.state import BODY
 from arm_ik_service.body.step import initialise_body, step_body
 from arm_ik_service.errors import SessionError
 from arm_ik_service.geometry import batch
 from arm_ik_service.io.columns import Archive
 from arm_ik_service.io.session import NPZ_MAGIC, open_session
-from arm_ik_service.programs.offline import profile_in, receive_times
+from arm_ik_service.programs.offline import profile_for, receive_times
 from arm_ik_service.settings import Settings, to_record
 from arm_ik_service.tracking.frame import FRAME, pack_frame
 from arm_ik_service.tracking.state import ACCEPTED, TRACKING
@@ -104,7 +103,7 @@ def _recorded(name: str, archive: Archive, frames: int) -> Iterator[ArmTask]:
 def _asked_for(path: Path, start: int, frames: int) -> list[ArmTask]:
     """Run tracking and body over the session and keep what they ask of the arms."""
     session = open_session(path)
-    profile = profile_in(session) or Profile()
+    profile = profile_for(session)
     settings = Settings()
     packed, tracking, body = np.zeros(1, FRAME), np.zeros(1, TRACKING), np.zeros(1, BODY)
     initialise_tracking(tracking[0])

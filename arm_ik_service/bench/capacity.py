@@ -134,9 +134,3 @@ def measure_capacity(*, rate_hz: float, seconds: float, progress: Progress | Non
                 if progress is not None:
                     progress("twice", overload.measured)
     return Capacity(rate_hz, ramps["service"], ramps["empty"], overload)
-
-
-def measure_one(*, avatars: int, rate_hz: float, seconds: float) -> Step:
-    """One number of people on one service, for as long as wanted: a soak."""
-    with serving("service") as bus:
-        return load(bus, avatars, rate_hz, seconds)

@@ -44,17 +44,16 @@ def check(
 
     from rich.console import Console as Terminal
 
-    from arm_ik_service.body.profile import Profile
     from arm_ik_service.body.profile_store import find_profile
     from arm_ik_service.cli.progress import frames_progress
     from arm_ik_service.io.session import open_session
     from arm_ik_service.programs.checker import check_avatar
-    from arm_ik_service.programs.offline import profile_in
+    from arm_ik_service.programs.offline import profile_for
     from arm_ik_service.settings import load_settings
 
     recording = open_session(session)
     used_settings = load_settings(settings)
-    used = find_profile(profile) if profile else profile_in(recording) or Profile()
+    used = profile_for(recording, find_profile(profile) if profile else None)
     reports = []
     with ExitStack() as stack:
         also: Callable[[RecordedFrame, ArmsState], None] | None = None

@@ -68,9 +68,9 @@ def _solve(
     import time
 
     from arm_ik_service.cli.progress import frames_progress
-    from arm_ik_service.programs.offline import profile_in, save_solution, solve_frames
+    from arm_ik_service.programs.offline import profile_for, save_solution, solve_frames
 
-    used = profile or profile_in(recording) or _average()
+    used = profile_for(recording, profile)
     frames = (recorded for recorded in recording.frames() if avatar in (None, recorded.avatar))
     began_s = time.perf_counter()
     with frames_progress(recording.path.name, recording.frame_count) as progress:
@@ -78,12 +78,6 @@ def _solve(
     elapsed_s = time.perf_counter() - began_s
     say(f"{output}: {count} frames solved in {elapsed_s:.1f} s, {1e6 * elapsed_s / max(count, 1):.0f} us each")
     return {"output": str(output), "frames": count, "elapsed_s": elapsed_s}
-
-
-def _average() -> Profile:
-    from arm_ik_service.body.profile import Profile
-
-    return Profile()
 
 
 def _verify(recording: Session, profile: Profile | None, settings: Settings) -> dict[str, Any]:

@@ -164,12 +164,6 @@ def rotation_y(angle: float) -> Quaternion:
 
 
 @compiled
-def rotation_z(angle: float) -> Quaternion:
-    """Rotation about z."""
-    return (0.0, 0.0, math.sin(0.5 * angle), math.cos(0.5 * angle))
-
-
-@compiled
 def twist_y(q: Quaternion) -> float:
     """Angle [rad] in (-pi, pi] of the twist about y in the decomposition q = swing * twist."""
     return wrap(2.0 * math.atan2(q[1], q[3]))

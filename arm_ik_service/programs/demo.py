@@ -24,7 +24,6 @@ from arm_ik_service.wire import codec
 from arm_ik_service.wire.keys import Keys
 from arm_ik_service.wire.messages import ArmsState
 
-DEFAULT_SESSION = "reach_and_grab"
 READY_WITHIN_S = 180.0  # a first start compiles
 ENDS_WITHIN_S = 10.0
 SETTLE_S = 0.3  # for the last answers to arrive

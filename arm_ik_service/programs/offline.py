@@ -34,6 +34,11 @@ def profile_in(session: Session) -> Profile | None:
     return None
 
 
+def profile_for(session: Session, stated: Profile | None = None) -> Profile:
+    """Return the profile to solve a recording with: the stated one, the recorded one, or an average person's."""
+    return stated or profile_in(session) or Profile()
+
+
 def receive_times(frames: Iterator[RecordedFrame]) -> Iterator[tuple[RecordedFrame, int]]:
     """Give every frame a receive time: its own, or the sample time of a file that has none.
 
@@ -124,7 +129,7 @@ def verify_session(
     The recording has to begin with the avatar's first frame: what the arm does depends on what it did.
     """
     result = Verification()
-    used = profile or profile_in(session) or Profile()
+    used = profile_for(session, profile)
     for avatar in session.avatars:
         published = (state for state in session.arms() if state.avatar == avatar)
         served = (recorded for recorded in as_served(session) if recorded.avatar == avatar)
