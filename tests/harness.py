@@ -13,6 +13,7 @@ from queue import SimpleQueue
 from threading import Event, Thread
 
 from arm_ik_service.io.zenoh_streams import Bus, Stream, declare_stream
+from arm_ik_service.wire import codec
 from arm_ik_service.wire.keys import Keys
 from arm_ik_service.wire.messages import VERSION, ArmsState, ControllerFrame, Health, TrackedPose
 
@@ -26,7 +27,7 @@ def wait_for(condition: Callable[[], bool], seconds: float = 10.0) -> bool:
     while not condition():
         if time.monotonic() > end:
             return False
-        time.sleep(0.01)
+        time.sleep(0.002)
     return True
 
 
@@ -74,14 +75,25 @@ class Service:
     bus: Bus
     answers: SimpleQueue[ArmsState]
     healths: list[Health]
+    newest: dict[str, int]  # seq of each avatar's last answer
 
     def take(self, count: int, seconds: float = 10.0) -> list[ArmsState]:
         """Return the next answers, as many as come in time but no more than `count`."""
         wait_for(lambda: self.answers.qsize() >= count, seconds)
         return [self.answers.get_nowait() for _ in range(min(count, self.answers.qsize()))]
 
+    def answered_and_overtaken(self, avatar: str) -> int:
+        """How many of an avatar's frames the last health accounts for: on a busy machine the newest frame wins."""
+        seats = (seat for health in self.healths[-1:] for seat in health.avatars if seat.avatar == avatar)
+        return sum(seat.answered + seat.overtaken for seat in seats)
+
     def stream(self, avatar: str) -> Stream:
         return declare_stream(self.bus, KEYS.controllers(avatar), "msgpack")
+
+    def ask(self, stream: Stream, avatar: str, frame: ControllerFrame) -> None:
+        """Put a frame and wait for its answer: on a busy machine it comes late, but no later frame overtakes it."""
+        stream.put(codec.encode(frame))
+        assert wait_for(lambda: self.newest.get(avatar) == frame.seq), f"{avatar}: frame {frame.seq} is not answered"
 
     def memory_kib(self) -> int:
         status = Path(f"/proc/{self.process.popen.pid}/status").read_text()

@@ -25,10 +25,17 @@ def service() -> Iterator[Service]:
         with open_client(BusOptions(connect=(endpoint,)), wait_s=10.0) as bus:
             answers: SimpleQueue[ArmsState] = SimpleQueue()
             healths: list[Health] = []
-            subscribe(bus, KEYS.arms(), lambda _k, payload, _t: answers.put(codec.arms_states.decode(payload)))
+            newest: dict[str, int] = {}
+
+            def take(_key: str, payload: bytes, _time_ns: int) -> None:
+                answer = codec.arms_states.decode(payload)
+                answers.put(answer)
+                newest[answer.avatar] = answer.seq
+
+            subscribe(bus, KEYS.arms(), take)
             subscribe(bus, KEYS.health(), lambda _k, payload, _t: healths.append(codec.healths.decode(payload)))
             time.sleep(0.1)  # for the subscriptions to reach the service
-            yield Service(process, endpoint, bus, answers, healths)
+            yield Service(process, endpoint, bus, answers, healths, newest)
     finally:
         if process.popen.poll() is None:
             process.popen.kill()

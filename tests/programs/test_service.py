@@ -19,8 +19,7 @@ PERIOD_NS = 11_111_111
 def test_every_frame_is_answered_once_with_its_own_number(service: Service) -> None:
     stream = service.stream("7")
     for seq in range(60):
-        stream.put(codec.encode(standing(seq, seq * PERIOD_NS)))
-        time.sleep(0.005)
+        service.ask(stream, "7", standing(seq, seq * PERIOD_NS))
     answers = service.take(60)
     assert [answer.seq for answer in answers] == list(range(60))
     assert {answer.avatar for answer in answers} == {"7"}
@@ -117,10 +116,9 @@ def test_ten_thousand_hostile_payloads_are_counted_and_cost_another_avatar_nothi
     before_kib = service.memory_kib()
     each = len(payloads) // 200
     for seq in range(200):
-        good.put(codec.encode(standing(seq, seq * PERIOD_NS)))
         for payload in payloads[seq * each : (seq + 1) * each]:
             hostile.put(payload)
-        time.sleep(0.01)
+        service.ask(good, "good", standing(seq, seq * PERIOD_NS))
     answered = service.take(10_000, 1.5)
     assert [answer.seq for answer in answered if answer.avatar == "good"] == list(range(200))
     assert all(abs(x) < 100.0 for answer in answered for x in answer.left.bones.hand.position)
