@@ -3,28 +3,23 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from arm_ik_service.cli.options import (
-    Connect,
-    Listen,
-    Scouting,
-    TlsAuthority,
-    TlsCertificate,
-    TlsKey,
-    ZenohConfig,
-    bus_options,
-    say,
-    stopped_by_signals,
-)
+from arm_ik_service.cli.options import say, stopped_by_signals
+from arm_ik_service.cli.zenoh_options import opens_client
 from arm_ik_service.wire.messages import Encoding, Space
+
+if TYPE_CHECKING:
+    from arm_ik_service.io.zenoh_bus import BusOptions
+
 
 bridge = typer.Typer(help="Publish controller frames live from a headset.", no_args_is_help=True)
 
 
 @bridge.command()
+@opens_client
 def web(
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port to serve on; 0 takes a free one.")] = 8443,
     host: Annotated[
@@ -40,13 +35,8 @@ def web(
     ] = None,
     encoding: Annotated[Encoding, typer.Option(help="How the frames are encoded.")] = "msgpack",
     prefix: Annotated[str, typer.Option(help="Key prefix, as in the service's settings.")] = "",
-    connect: Connect = None,
-    listen: Listen = None,
-    scouting: Scouting = False,
-    zenoh_config: ZenohConfig = None,
-    tls_cert: TlsCertificate = None,
-    tls_key: TlsKey = None,
-    tls_ca: TlsAuthority = None,
+    *,
+    zenoh: BusOptions,
 ) -> None:
     """Serve a page that a headset's browser opens: poses come from it, and it draws both arms in VR.
 
@@ -91,9 +81,7 @@ def web(
         with stopped_by_signals(stop):
             await web_bridge.run(host, stopped, ready)
 
-    with open_client(
-        bus_options(connect, listen, scouting, zenoh_config, tls_cert, tls_key, tls_ca), waiting=say
-    ) as bus:
+    with open_client(zenoh, waiting=say) as bus:
         web_bridge = WebBridge(
             bus,
             Keys(prefix),
@@ -108,6 +96,7 @@ def web(
 
 
 @bridge.command()
+@opens_client
 def openxr(
     avatar: Annotated[str, typer.Option(help="Avatar id to publish under.")] = "openxr",
     rate_hz: Annotated[
@@ -131,10 +120,8 @@ def openxr(
     probe_s: Annotated[float, typer.Option("--probe-for", metavar="SECONDS", min=0.0, help="How long to show.")] = 3.0,
     encoding: Annotated[Encoding, typer.Option(help="How the frames are encoded.")] = "msgpack",
     prefix: Annotated[str, typer.Option(help="Key prefix, as in the service's settings.")] = "",
-    connect: Connect = None,
-    listen: Listen = None,
-    scouting: Scouting = False,
-    zenoh_config: ZenohConfig = None,
+    *,
+    zenoh: BusOptions,
 ) -> None:
     """Publish head and grips of the installed OpenXR runtime (Monado, SteamVR) from a session without a window.
 
@@ -159,7 +146,7 @@ def openxr(
             loop.probe(runtime, space=space, seconds=probe_s, show=typer.echo, stopped=stopped)
         return
     loop.check(runtime, space)  # before the bus is waited for
-    with open_client(bus_options(connect, listen, scouting, zenoh_config), waiting=say) as bus:
+    with open_client(zenoh, waiting=say) as bus:
         publisher = FramePublisher(bus, Keys(prefix), avatar, encoding)
         running = loop.OpenXrBridge(
             runtime, publisher, rate_hz=rate_hz, space=space, frozen_after_s=frozen_after_s, say=say

@@ -7,26 +7,20 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from arm_ik_service.cli.options import (
-    Connect,
-    Json,
-    Listen,
-    ProfileName,
-    Scouting,
-    ZenohConfig,
-    bus_options,
-    say,
-)
+from arm_ik_service.cli.options import Json, ProfileName, say
+from arm_ik_service.cli.zenoh_options import opens_client
 
 if TYPE_CHECKING:
     import numpy as np
 
+    from arm_ik_service.io.zenoh_bus import BusOptions
     from arm_ik_service.io.zenoh_streams import Bus
     from arm_ik_service.wire.keys import Keys
 
 Pose = Literal["t_pose", "a_pose", "moving"]
 
 
+@opens_client
 def calibrate(
     session: Annotated[
         Path | None, typer.Argument(metavar="[SESSION]", help="A recording; without one, the person who is live.")
@@ -43,10 +37,8 @@ def calibrate(
     profile: ProfileName = None,
     prefix: Annotated[str, typer.Option(help="Key prefix, as in the service's settings.")] = "",
     json_output: Json = False,
-    connect: Connect = None,
-    listen: Listen = None,
-    scouting: Scouting = False,
-    zenoh_config: ZenohConfig = None,
+    *,
+    zenoh: BusOptions,
 ) -> None:
     """Measure a person: stature, arm lengths and how the controllers are held; says how sure it is.
 
@@ -77,7 +69,7 @@ def calibrate(
         from arm_ik_service.wire.codec import encode
 
         who, keys = check_id(avatar or ""), Keys(prefix)
-        with open_client(bus_options(connect, listen, scouting, zenoh_config), waiting=say) as bus:
+        with open_client(zenoh, waiting=say) as bus:
             calibration = measure(_live(bus, who, pose, seconds, keys), pose, start)
             put_once(bus, keys.calibration(who), encode(calibration.profile, "json"), "json")
     lines = describe(calibration)

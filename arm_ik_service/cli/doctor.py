@@ -2,35 +2,26 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from arm_ik_service.cli.options import (
-    Connect,
-    Json,
-    Listen,
-    Scouting,
-    TlsAuthority,
-    TlsCertificate,
-    TlsKey,
-    ZenohConfig,
-    bus_options,
-)
+from arm_ik_service.cli.options import Json
+from arm_ik_service.cli.zenoh_options import opens_client
+
+if TYPE_CHECKING:
+    from arm_ik_service.io.zenoh_bus import BusOptions
+
 
 _SIGNS = {"well": "[green]well[/green]", "note": "[yellow]note[/yellow]", "ill": "[red]ill[/red]"}
 
 
+@opens_client
 def doctor(
     prefix: Annotated[str, typer.Option(help="Key prefix, as in the service's settings.")] = "",
     json_output: Json = False,
-    connect: Connect = None,
-    listen: Listen = None,
-    scouting: Scouting = False,
-    zenoh_config: ZenohConfig = None,
-    tls_cert: TlsCertificate = None,
-    tls_key: TlsKey = None,
-    tls_ca: TlsAuthority = None,
+    *,
+    zenoh: BusOptions,
 ) -> None:
     """Look at everything that is known to go wrong: versions, kernels, viewer, certificates, ports, Zenoh.
 
@@ -45,10 +36,9 @@ def doctor(
     from arm_ik_service.programs.doctor import examine
     from arm_ik_service.wire.keys import Keys
 
-    options = bus_options(connect, listen, scouting, zenoh_config, tls_cert, tls_key, tls_ca)
     console = Console(highlight=False, soft_wrap=True)
     findings = []
-    for finding in examine(options, Keys(prefix)):
+    for finding in examine(zenoh, Keys(prefix)):
         findings.append(finding)
         if not json_output:
             console.print(f"{_SIGNS[finding.state]}  {finding.what}: ", end="")

@@ -6,23 +6,17 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from arm_ik_service.cli.options import (
-    Connect,
-    Json,
-    Listen,
-    Scouting,
-    ZenohConfig,
-    bus_options,
-    say,
-    stopped_by_signals,
-)
+from arm_ik_service.cli.options import Json, say, stopped_by_signals
+from arm_ik_service.cli.zenoh_options import opens_client
 from arm_ik_service.exports.dialects import OSC_PORTS, LiveDialect, RosWay
 
 if TYPE_CHECKING:
+    from arm_ik_service.io.zenoh_bus import BusOptions
     from arm_ik_service.io.zenoh_streams import Bus
     from arm_ik_service.programs.sinks import Sink
 
 
+@opens_client
 def export(
     dialect: Annotated[
         LiveDialect,
@@ -52,10 +46,8 @@ def export(
     ] = None,
     prefix: Annotated[str, typer.Option(help="Key prefix, as in the service's settings.")] = "",
     json_output: Json = False,
-    connect: Connect = None,
-    listen: Listen = None,
-    scouting: Scouting = False,
-    zenoh_config: ZenohConfig = None,
+    *,
+    zenoh: BusOptions,
 ) -> None:
     """Send everybody's arms on to programs that speak another dialect, until Ctrl-C. For files: arm-ik convert.
 
@@ -81,7 +73,7 @@ def export(
             return Ros2Sink(bus, domain=domain, rmw_zenoh=way is not RosWay.ROS2DDS, bridge=way is not RosWay.RMW_ZENOH)
         return BodyTrackingSink(bus, prefix)
 
-    with open_client(bus_options(connect, listen, scouting, zenoh_config), waiting=say) as bus:
+    with open_client(zenoh, waiting=say) as bus:
         exporter = Exporter(bus, sink_on(bus), Keys(prefix), avatar=avatar, mirror=mirror, most_hz=most_hz)
         with stopped_by_signals(exporter.stop):
             where = f" to {host}:{port}" if host else ""

@@ -4,25 +4,18 @@ from __future__ import annotations
 
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from arm_ik_service.cli.options import (
-    AvatarFile,
-    Connect,
-    Listen,
-    ProfileName,
-    Scouting,
-    SkinningChoice,
-    ZenohConfig,
-    bus_options,
-    say,
-    skin_options,
-    stopped_by_signals,
-)
+from arm_ik_service.cli.options import AvatarFile, ProfileName, SkinningChoice, say, skin_options, stopped_by_signals
+from arm_ik_service.cli.zenoh_options import opens_hub
+
+if TYPE_CHECKING:
+    from arm_ik_service.io.zenoh_bus import BusOptions
 
 
+@opens_hub
 def grab(
     cube: Annotated[
         str, typer.Option(metavar="X,Y,Z", help="Where the cube is [m]; the person faces -z.")
@@ -43,10 +36,8 @@ def grab(
     avatar: AvatarFile = None,
     skinning: SkinningChoice = None,
     profile: ProfileName = None,
-    connect: Connect = None,
-    listen: Listen = None,
-    scouting: Scouting = False,
-    zenoh_config: ZenohConfig = None,
+    *,
+    zenoh: BusOptions,
 ) -> None:
     """Somebody walks to a cube, takes it and carries it: inverse kinematics at work.
 
@@ -84,7 +75,7 @@ def grab(
     with ExitStack() as stack:
         bus = None
         if not fast:
-            bus = stack.enter_context(open_hub(bus_options(connect, listen, scouting, zenoh_config), waiting=say))
+            bus = stack.enter_context(open_hub(zenoh, waiting=say))
         show = GrabShow(
             scene, bus=bus, sinks=sinks, skin=skin_options(avatar, skinning) if sinks else None, record=record, say=say
         )

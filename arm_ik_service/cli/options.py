@@ -12,55 +12,7 @@ import typer
 
 if TYPE_CHECKING:
     from arm_ik_service.io.rerun_view import Skin
-    from arm_ik_service.io.zenoh_bus import BusOptions
 
-Connect = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--connect",
-        metavar="ENDPOINT",
-        help="Zenoh endpoint to connect to, e.g. tcp/127.0.0.1:7447.",
-        rich_help_panel="Zenoh",
-    ),
-]
-Listen = Annotated[
-    list[str] | None,
-    typer.Option("--listen", metavar="ENDPOINT", help="Zenoh endpoint to listen on.", rich_help_panel="Zenoh"),
-]
-Scouting = Annotated[
-    bool,
-    typer.Option("--scouting/--no-scouting", help="Find other Zenoh peers by multicast.", rich_help_panel="Zenoh"),
-]
-ZenohConfig = Annotated[
-    Path | None,
-    typer.Option("--zenoh-config", metavar="FILE", help="A whole Zenoh configuration, JSON5.", rich_help_panel="Zenoh"),
-]
-TlsCertificate = Annotated[
-    Path | None,
-    typer.Option("--tls-cert", metavar="FILE", help="Our own certificate, PEM.", rich_help_panel="Zenoh"),
-]
-TlsKey = Annotated[
-    Path | None,
-    typer.Option("--tls-key", metavar="FILE", help="The key of --tls-cert, PEM.", rich_help_panel="Zenoh"),
-]
-TlsAuthority = Annotated[
-    Path | None,
-    typer.Option(
-        "--tls-ca",
-        metavar="FILE",
-        help="The authority that signs everybody's certificates, PEM; see arm-ik certificates.",
-        rich_help_panel="Zenoh",
-    ),
-]
-Access = Annotated[
-    Path | None,
-    typer.Option(
-        "--access",
-        metavar="FILE",
-        help="Who may read and write what, by certificate: access.json of arm-ik certificates.",
-        rich_help_panel="Zenoh",
-    ),
-]
 ProfileName = Annotated[
     str | None,
     typer.Option("--profile", metavar="NAME|FILE", help="Calibration profile: a saved one by name, or a TOML file."),
@@ -87,33 +39,6 @@ SkinningChoice = Annotated[
     ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object for machines instead of text.")]
-
-
-def bus_options(
-    connect: list[str] | None,
-    listen: list[str] | None,
-    scouting: bool,
-    zenoh_config: Path | None,
-    tls_cert: Path | None = None,
-    tls_key: Path | None = None,
-    tls_ca: Path | None = None,
-    access: Path | None = None,
-) -> BusOptions:
-    """Gather the Zenoh options. Raises SettingsError where some of what TLS needs is missing."""
-    from arm_ik_service.errors import SettingsError
-    from arm_ik_service.io.zenoh_bus import BusOptions, TlsFiles
-
-    files = [tls_cert, tls_key, tls_ca]
-    tls = None
-    if tls_cert and tls_key and tls_ca:
-        tls = TlsFiles(tls_cert, tls_key, tls_ca)
-    elif any(files):
-        raise SettingsError(
-            "--tls-cert, --tls-key and --tls-ca belong together: both sides of a link show who they are"
-        )
-    if access and not tls:
-        raise SettingsError("--access tells people apart by their certificates: it needs --tls-cert --tls-key --tls-ca")
-    return BusOptions(tuple(connect or ()), tuple(listen or ()), scouting, zenoh_config, tls, access)
 
 
 def skin_options(avatar: Path | None, skinning: Literal["linear", "dual_quaternion"] | None) -> Skin | None:

@@ -3,25 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from arm_ik_service.cli.options import (
-    Connect,
-    Json,
-    Listen,
-    Scouting,
-    TlsAuthority,
-    TlsCertificate,
-    TlsKey,
-    ZenohConfig,
-    bus_options,
-    say,
-    stopped_by_signals,
-)
+from arm_ik_service.cli.options import Json, say, stopped_by_signals
+from arm_ik_service.cli.zenoh_options import opens_client
+
+if TYPE_CHECKING:
+    from arm_ik_service.io.zenoh_bus import BusOptions
 
 
+@opens_client
 def record(
     output: Annotated[Path, typer.Argument(metavar="FILE", help="The .mcap file to write.")],
     duration_s: Annotated[
@@ -30,13 +23,8 @@ def record(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an existing file.")] = False,
     prefix: Annotated[str, typer.Option(help="Key prefix, as in the service's settings.")] = "",
     json_output: Json = False,
-    connect: Connect = None,
-    listen: Listen = None,
-    scouting: Scouting = False,
-    zenoh_config: ZenohConfig = None,
-    tls_cert: TlsCertificate = None,
-    tls_key: TlsKey = None,
-    tls_ca: TlsAuthority = None,
+    *,
+    zenoh: BusOptions,
 ) -> None:
     """Record everybody's controllers and arms to an MCAP file, until Ctrl-C.
 
@@ -56,9 +44,7 @@ def record(
     if output.exists() and not overwrite:
         raise SessionError(f"{output} exists: choose another name, or --overwrite")
     with (
-        open_client(
-            bus_options(connect, listen, scouting, zenoh_config, tls_cert, tls_key, tls_ca), waiting=say
-        ) as bus,
+        open_client(zenoh, waiting=say) as bus,
         frames_progress(output.name, None) as advance,
     ):
         shown = 0

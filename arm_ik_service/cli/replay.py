@@ -3,26 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from arm_ik_service.cli.options import (
-    Connect,
-    Json,
-    Listen,
-    Scouting,
-    TlsAuthority,
-    TlsCertificate,
-    TlsKey,
-    ZenohConfig,
-    bus_options,
-    say,
-    stopped_by_signals,
-)
+from arm_ik_service.cli.options import Json, say, stopped_by_signals
+from arm_ik_service.cli.zenoh_options import opens_client
 from arm_ik_service.wire.messages import Encoding
 
+if TYPE_CHECKING:
+    from arm_ik_service.io.zenoh_bus import BusOptions
 
+
+@opens_client
 def replay(
     session: Annotated[Path, typer.Argument(metavar="SESSION", help="A .mcap, .bsor or .npz recording.")],
     speed: Annotated[float, typer.Option(min=0.01, max=100.0, help="2 plays twice as fast.")] = 1.0,
@@ -33,13 +26,8 @@ def replay(
     encoding: Annotated[Encoding, typer.Option(help="How the frames are encoded.")] = "msgpack",
     prefix: Annotated[str, typer.Option(help="Key prefix, as in the service's settings.")] = "",
     json_output: Json = False,
-    connect: Connect = None,
-    listen: Listen = None,
-    scouting: Scouting = False,
-    zenoh_config: ZenohConfig = None,
-    tls_cert: TlsCertificate = None,
-    tls_key: TlsKey = None,
-    tls_ca: TlsAuthority = None,
+    *,
+    zenoh: BusOptions,
 ) -> None:
     """Publish a recorded session to Zenoh at the pace at which it was recorded.
 
@@ -61,9 +49,7 @@ def replay(
         check_id(avatar)
     recording = open_session(session)
     options = ReplayOptions(speed, loop, from_s, to_s, avatar, encoding)
-    with open_client(
-        bus_options(connect, listen, scouting, zenoh_config, tls_cert, tls_key, tls_ca), waiting=say
-    ) as bus:
+    with open_client(zenoh, waiting=say) as bus:
         whole = not loop and from_s == 0.0 and to_s is None
         with frames_progress(session.name, recording.frame_count if whole else None) as progress:
             replayer = Replayer(bus, recording, options, Keys(prefix), progress=progress, warn=say)

@@ -2,30 +2,19 @@
 
 from __future__ import annotations
 
-from arm_ik_service.cli.options import (
-    Access,
-    Connect,
-    Listen,
-    Scouting,
-    TlsAuthority,
-    TlsCertificate,
-    TlsKey,
-    ZenohConfig,
-    bus_options,
-    say,
-    stopped_by_signals,
-)
+from typing import TYPE_CHECKING
+
+from arm_ik_service.cli.options import say, stopped_by_signals
+from arm_ik_service.cli.zenoh_options import opens_hub
+
+if TYPE_CHECKING:
+    from arm_ik_service.io.zenoh_bus import BusOptions
 
 
+@opens_hub
 def router(
-    connect: Connect = None,
-    listen: Listen = None,
-    scouting: Scouting = False,
-    zenoh_config: ZenohConfig = None,
-    tls_cert: TlsCertificate = None,
-    tls_key: TlsKey = None,
-    tls_ca: TlsAuthority = None,
-    access: Access = None,
+    *,
+    zenoh: BusOptions,
 ) -> None:
     """Route between services, headsets and viewers that all connect to one place, for those who want one.
 
@@ -42,12 +31,11 @@ def router(
     from arm_ik_service.io.zenoh_log import log_zenoh
 
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
-    options = bus_options(connect, listen, scouting, zenoh_config, tls_cert, tls_key, tls_ca, access)
-    if connect and not listen:
+    if zenoh.connect and not zenoh.listen:
         raise SettingsError("a router listens: say where with --listen tcp/HOST:PORT")
-    pass_on_log = log_zenoh(denials=access is not None)
+    pass_on_log = log_zenoh(denials=zenoh.access_file is not None)
     stopped = Event()
-    with open_router(options), stopped_by_signals(stopped.set):
+    with open_router(zenoh), stopped_by_signals(stopped.set):
         pass_on_log()
-        say(f"ready: routes on {', '.join(options.listens_on()) or zenoh_config}; Ctrl-C ends it")
+        say(f"ready: routes on {', '.join(zenoh.listens_on()) or zenoh.config_file}; Ctrl-C ends it")
         stopped.wait()

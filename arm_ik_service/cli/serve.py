@@ -2,41 +2,26 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from arm_ik_service.cli.options import (
-    Access,
-    Connect,
-    Listen,
-    ProfileName,
-    Scouting,
-    SettingsFile,
-    TlsAuthority,
-    TlsCertificate,
-    TlsKey,
-    ZenohConfig,
-    bus_options,
-    say,
-    stopped_by_signals,
-)
+from arm_ik_service.cli.options import ProfileName, SettingsFile, say, stopped_by_signals
+from arm_ik_service.cli.zenoh_options import opens_hub
+
+if TYPE_CHECKING:
+    from arm_ik_service.io.zenoh_bus import BusOptions
 
 
+@opens_hub
 def serve(
     name: Annotated[
         str | None, typer.Option(help="Name of this service on the bus; default: host and process.")
     ] = None,
     profile: ProfileName = None,
     settings: SettingsFile = None,
-    connect: Connect = None,
-    listen: Listen = None,
-    scouting: Scouting = False,
-    zenoh_config: ZenohConfig = None,
-    tls_cert: TlsCertificate = None,
-    tls_key: TlsKey = None,
-    tls_ca: TlsAuthority = None,
-    access: Access = None,
+    *,
+    zenoh: BusOptions,
 ) -> None:
     """Solve both arms of everybody who publishes on avatar/<id>/controllers, and publish avatar/<id>/arms.
 
@@ -62,17 +47,16 @@ def serve(
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
     host = re.sub(r"[^A-Za-z0-9_-]", "-", socket.gethostname())[:40]
     service_name = check_id(name or f"{host}-{os.getpid()}")
-    options = bus_options(connect, listen, scouting, zenoh_config, tls_cert, tls_key, tls_ca, access)
     used_profile, used_settings = find_profile(profile), load_settings(settings)
-    pass_on_log = log_zenoh(denials=access is not None)
-    with open_hub(options, waiting=say) as bus:
+    pass_on_log = log_zenoh(denials=zenoh.access_file is not None)
+    with open_hub(zenoh, waiting=say) as bus:
         pass_on_log()
         warm_up(used_settings, say)
         from arm_ik_service.programs.service import Service
 
         service = Service(bus, name=service_name, settings=used_settings, profile=used_profile)
         with stopped_by_signals(service.stop):
-            where = ", ".join(options.listens_on() or options.connects_to()) or str(zenoh_config)
+            where = ", ".join(zenoh.listens_on() or zenoh.connects_to()) or str(zenoh.config_file)
             say(f"ready in {time.perf_counter() - began_s:.1f} s: {service_name} serves on {where}; Ctrl-C ends it")
             service.run()
         service.close()

@@ -6,41 +6,27 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from arm_ik_service.cli.options import (
-    Connect,
-    Json,
-    Listen,
-    Scouting,
-    TlsAuthority,
-    TlsCertificate,
-    TlsKey,
-    ZenohConfig,
-    bus_options,
-    say,
-    stopped_by_signals,
-)
+from arm_ik_service.cli.options import Json, say, stopped_by_signals
+from arm_ik_service.cli.zenoh_options import opens_client
 
 if TYPE_CHECKING:
     from rich.console import Group
 
+    from arm_ik_service.io.zenoh_bus import BusOptions
     from arm_ik_service.wire.messages import Health
 
 PERIOD_S = 0.5
 
 
+@opens_client
 def top(
     duration_s: Annotated[
         float | None, typer.Option("--duration", metavar="SECONDS", min=0.1, help="Stop after so long.")
     ] = None,
     prefix: Annotated[str, typer.Option(help="Key prefix, as in the service's settings.")] = "",
     json_output: Json = False,
-    connect: Connect = None,
-    listen: Listen = None,
-    scouting: Scouting = False,
-    zenoh_config: ZenohConfig = None,
-    tls_cert: TlsCertificate = None,
-    tls_key: TlsKey = None,
-    tls_ca: TlsAuthority = None,
+    *,
+    zenoh: BusOptions,
 ) -> None:
     """Show every service and avatar live: rate, latency, residual, tracking, frames lost.
 
@@ -61,8 +47,7 @@ def top(
     from arm_ik_service.wire.keys import Keys
 
     stopped = Event()
-    options = bus_options(connect, listen, scouting, zenoh_config, tls_cert, tls_key, tls_ca)
-    with open_client(options, waiting=say) as bus, stopped_by_signals(stopped.set):
+    with open_client(zenoh, waiting=say) as bus, stopped_by_signals(stopped.set):
         watched = Top(bus, Keys(prefix))
         if json_output:
             stopped.wait(duration_s or 2.5)  # two healths

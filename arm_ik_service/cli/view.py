@@ -3,27 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from arm_ik_service.cli.options import (
-    AvatarFile,
-    Connect,
-    Listen,
-    Scouting,
-    SkinningChoice,
-    TlsAuthority,
-    TlsCertificate,
-    TlsKey,
-    ZenohConfig,
-    bus_options,
-    say,
-    skin_options,
-    stopped_by_signals,
-)
+from arm_ik_service.cli.options import AvatarFile, SkinningChoice, say, skin_options, stopped_by_signals
+from arm_ik_service.cli.zenoh_options import opens_client
+
+if TYPE_CHECKING:
+    from arm_ik_service.io.zenoh_bus import BusOptions
 
 
+@opens_client
 def view(
     save: Annotated[Path | None, typer.Option("--save", metavar="FILE", help="Write an .rrd file.")] = None,
     spawn: Annotated[bool, typer.Option("--spawn", help="Open the Rerun viewer (the default).")] = False,
@@ -37,13 +28,8 @@ def view(
     avatar: AvatarFile = None,
     skinning: SkinningChoice = None,
     prefix: Annotated[str, typer.Option(help="Key prefix, as in the service's settings.")] = "",
-    connect: Connect = None,
-    listen: Listen = None,
-    scouting: Scouting = False,
-    zenoh_config: ZenohConfig = None,
-    tls_cert: TlsCertificate = None,
-    tls_key: TlsKey = None,
-    tls_ca: TlsAuthority = None,
+    *,
+    zenoh: BusOptions,
 ) -> None:
     """Show everybody's arms in Rerun, until Ctrl-C. Several outputs may be given together.
 
@@ -65,9 +51,7 @@ def view(
     if spawn or not sinks:
         sinks.append(Spawn())
     skin = skin_options(avatar, skinning)
-    with open_client(
-        bus_options(connect, listen, scouting, zenoh_config, tls_cert, tls_key, tls_ca), waiting=say
-    ) as bus:
+    with open_client(zenoh, waiting=say) as bus:
         viewer = Viewer(bus, sinks, Keys(prefix), skin)
         for sink in sinks:
             if isinstance(sink, Web):
