@@ -15,6 +15,8 @@ from arm_ik_service.io.zenoh_streams import put_once, query
 from arm_ik_service.programs.demo import bundled_session
 from arm_ik_service.wire import codec
 
+pytestmark = pytest.mark.slow  # real processes, one after the other: the default run has three minutes
+
 
 def arm_ik(*arguments: str, profiles: Path) -> subprocess.CompletedProcess[str]:
     environment = {**os.environ, "ARM_IK_PROFILES": str(profiles)}
