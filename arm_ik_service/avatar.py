@@ -6,6 +6,7 @@ disk: the same frames with the same receive times give the same bytes, live or r
 
 from __future__ import annotations
 
+import struct
 from typing import Any
 
 import numpy as np
@@ -14,48 +15,74 @@ from arm_ik_service.arm.model import ArmModel
 from arm_ik_service.body.profile import Profile
 from arm_ik_service.body.state import BODY
 from arm_ik_service.body.step import initialise_body, step_body
-from arm_ik_service.compiled import Record, compiled, record_dtype
+from arm_ik_service.compiled import compiled, record_dtype
 from arm_ik_service.ik.state import ARM
 from arm_ik_service.ik.step import initialise_arm, show_ahead, step_arm
-from arm_ik_service.output import OUTPUT, read_output, write_output
-from arm_ik_service.settings import Settings, to_record
+from arm_ik_service.output.message import BODY_BYTES, LITERALS, STEPS, write_body
+from arm_ik_service.output.record import OUTPUT, write_output
+from arm_ik_service.settings import BodySettings, Settings, SolverSettings, TrackingSettings, section_dtype, to_record
 from arm_ik_service.tracking.frame import FRAME, pack_frame
 from arm_ik_service.tracking.state import TRACKING
 from arm_ik_service.tracking.step import ACCEPTED, initialise_tracking, step_tracking
-from arm_ik_service.wire.messages import SIDES, ArmsState, ControllerFrame
+from arm_ik_service.wire import codec
+from arm_ik_service.wire.messages import SIDES, VERSION, ArmsHeader, ArmsState, ControllerFrame, Encoding
 
 AVATAR = record_dtype([("tracking", TRACKING), ("body", BODY), ("arms", ARM, (2,))])
+TASK = record_dtype(
+    [
+        ("row", np.int64),  # of the avatar
+        ("receive_time_ns", np.int64),
+        ("ahead_s", np.float64),  # how far to predict
+        ("frame", FRAME),
+        ("verdict", np.int64),
+        ("body_bytes", np.int64),  # length of the message's body
+    ]
+)
+SETTINGS = record_dtype(
+    [
+        ("tracking", section_dtype(TrackingSettings)),
+        ("body", section_dtype(BodySettings)),
+        ("solver", section_dtype(SolverSettings)),
+    ]
+)
+_TASK_HEAD = struct.Struct("=2qd")
 
 
 @compiled
 def step_batch(
-    rows: Any,
-    outputs: Any,
-    indices: Any,
-    frames: Any,
-    receive_times_ns: Any,
-    ahead_s: Any,
-    verdicts: Any,
+    rows_memory: Any,
+    tasks_memory: Any,
+    outputs_memory: Any,
+    bodies: Any,
+    settings_memory: Any,
+    literals: Any,
+    steps: Any,
     count: int,
-    tracking_settings: Record,
-    body_settings: Record,
-    solver_settings: Record,
 ) -> None:
-    """Run every stage for `count` frames in order: frame k is of the avatar in row `indices[k]` and fills output k."""
+    """Run every stage for the first `count` tasks in order: task k is of the avatar in its row and fills body k.
+
+    Records come as memory without a structure, uint8 or int64: to tell numba the type of an array of records takes
+    longer than to solve for it.
+    """
+    rows, tasks, outputs = rows_memory.view(AVATAR), tasks_memory.view(TASK), outputs_memory.view(OUTPUT)
+    settings = settings_memory.view(SETTINGS)[0]
+    numbers = len(outputs_memory) // len(outputs)
     for k in range(count):
-        row = rows[indices[k]]
-        verdicts[k] = step_tracking(row.tracking, frames[k], receive_times_ns[k], tracking_settings)
-        if verdicts[k] != ACCEPTED:
+        task = tasks[k]
+        row = rows[task.row]
+        task.verdict = step_tracking(row.tracking, task.frame, task.receive_time_ns, settings.tracking)
+        if task.verdict != ACCEPTED:
             continue
-        step_body(row.body, row.tracking, body_settings)
+        step_body(row.body, row.tracking, settings.body)
         for side in range(2):
             arm = row.arms[side]
             if row.body.learning.arms:  # nobody measured this person: their arms are as long as they turn out to be
                 arm.chain.upper_arm_m, arm.chain.forearm_m = row.body.upper_arm, row.body.forearm
-            step_arm(arm, row.body.targets[side], row.tracking.dt_s, solver_settings)
-            if ahead_s[k] > 0.0:
-                show_ahead(arm, ahead_s[k])
+            step_arm(arm, row.body.targets[side], row.tracking.dt_s, settings.solver)
+            if task.ahead_s > 0.0:
+                show_ahead(arm, task.ahead_s)
         write_output(outputs[k], row.tracking, row.body, row.arms)
+        task.body_bytes = write_body(outputs_memory[k * numbers : (k + 1) * numbers], literals, steps, bodies[k])
 
 
 class Avatars:
@@ -64,14 +91,19 @@ class Avatars:
     def __init__(self, settings: Settings | None = None, *, capacity: int = 1, batch: int = 1) -> None:
         settings = settings or Settings()
         self._rows = np.zeros(capacity, AVATAR)
-        self._frames = np.zeros(batch, FRAME)
-        self._indices = np.zeros(batch, np.int64)
-        self._receive_times_ns = np.zeros(batch, np.int64)
-        self._ahead_s = np.zeros(batch)
-        self._outputs = np.zeros(batch, OUTPUT)
+        self._memory = self._rows.view(np.uint8)
+        tasks = np.zeros(batch, TASK)
+        self.verdicts = tasks["verdict"]
+        self._body_bytes = tasks["body_bytes"]
+        bodies = np.zeros((batch, BODY_BYTES), np.uint8)
+        self._bodies = [body.data for body in bodies]
+        of = np.zeros(1, SETTINGS)
+        of["tracking"], of["body"] = to_record(settings.tracking), to_record(settings.body)
+        of["solver"] = to_record(settings.solver)
+        self._tasks = tasks.view(np.uint8)
+        self._tasks_buffer = self._tasks.data
+        self._rest = (np.zeros(batch, OUTPUT).view(np.int64), bodies, of.view(np.uint8), LITERALS, STEPS)
         self._predict_s = settings.solver.predict_s
-        self.verdicts = np.zeros(batch, np.int64)
-        self._settings = (to_record(settings.tracking), to_record(settings.body), to_record(settings.solver))
         self._models: dict[Profile, tuple[ArmModel, ArmModel]] = {}
         self.count = 0
 
@@ -80,6 +112,7 @@ class Avatars:
         missing = capacity - len(self._rows)
         if missing > 0:
             self._rows = np.concatenate([self._rows, np.zeros(missing, AVATAR)])
+            self._memory = self._rows.view(np.uint8)
 
     def reset(self, index: int, profile: Profile) -> None:
         """Make row `index` a person of this profile at rest. Raises ModelError or ProfileError."""
@@ -132,31 +165,19 @@ class Avatars:
         settings say, which is no prediction unless they do.
         """
         place = self.count
-        self._ahead_s[place] = (
-            self._predict_s if predict_to_ns is None else 1e-9 * (predict_to_ns - frame.sample_time_ns)
-        )
-        pack_frame(frame, self._frames, place)
-        self._indices[place] = index
-        self._receive_times_ns[place] = receive_time_ns
+        ahead_s = self._predict_s if predict_to_ns is None else 1e-9 * (predict_to_ns - frame.sample_time_ns)
+        at = place * TASK.itemsize
+        _TASK_HEAD.pack_into(self._tasks_buffer, at, index, receive_time_ns, ahead_s)
+        pack_frame(frame, self._tasks_buffer, at + _TASK_HEAD.size)
         self.count = place + 1
         return place
 
     def step(self) -> None:
         """Solve the batch and empty it; `verdicts[place]` says what became of each frame."""
-        step_batch(
-            self._rows,
-            self._outputs,
-            self._indices,
-            self._frames,
-            self._receive_times_ns,
-            self._ahead_s,
-            self.verdicts,
-            self.count,
-            *self._settings,
-        )
+        step_batch(self._memory, self._tasks, *self._rest, self.count)
         self.count = 0
 
-    def answer(
+    def payload(
         self,
         place: int,
         frame: ControllerFrame,
@@ -164,18 +185,18 @@ class Avatars:
         receive_time_ns: int,
         solve_time_ns: int = 0,
         publish_time_ns: int = 0,
-    ) -> ArmsState:
-        """Return the message that answers the accepted frame at `place` of the last batch."""
-        return read_output(
-            self._outputs,
-            place,
-            avatar=avatar,
-            seq=frame.seq,
-            sample_time_ns=frame.sample_time_ns,
-            receive_time_ns=receive_time_ns,
-            solve_time_ns=solve_time_ns,
-            publish_time_ns=publish_time_ns,
+        encoding: Encoding = "msgpack",
+    ) -> bytes:
+        """Return the encoded ArmsState that answers the accepted frame at `place` of the last batch."""
+        header = ArmsHeader(
+            VERSION, avatar, frame.seq, frame.sample_time_ns, receive_time_ns, solve_time_ns, publish_time_ns
         )
+        payload = codec.join(header, self._bodies[place][: self._body_bytes[place]])
+        return payload if encoding == "msgpack" else codec.encode(codec.arms_states.decode(payload), encoding)
+
+    def answer(self, place: int, frame: ControllerFrame, avatar: str, receive_time_ns: int) -> ArmsState:
+        """Return the same as an object, its solve and publish times 0."""
+        return codec.arms_states.decode(self.payload(place, frame, avatar, receive_time_ns))
 
 
 class Avatar:

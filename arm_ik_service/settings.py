@@ -105,11 +105,15 @@ def _dtype_of(hint: Any) -> Any:
     return np.int64 if choice or hint in (int, bool) else np.float64
 
 
+def section_dtype(section: type[msgspec.Struct]) -> np.dtype[Any]:
+    """Return the dtype of a section's record."""
+    return record_dtype([(name, _dtype_of(hint)) for name, hint in get_type_hints(section).items()])
+
+
 def to_record(section: msgspec.Struct) -> Record:
     """Flatten a section of numbers and choices into one record of its field names."""
-    hints = get_type_hints(type(section))
-    record = np.zeros(1, record_dtype([(name, _dtype_of(hint)) for name, hint in hints.items()]))
-    for name, hint in hints.items():
+    record = np.zeros(1, section_dtype(type(section)))
+    for name, hint in get_type_hints(type(section)).items():
         value = getattr(section, name)
         record[0][name] = get_args(hint).index(value) if get_origin(hint) is Literal else value
     return record[0]

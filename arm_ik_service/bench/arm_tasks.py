@@ -113,7 +113,7 @@ def _asked_for(path: Path, start: int, frames: int) -> list[ArmTask]:
     avatar = session.avatars[0]
     stream = receive_times(recorded for recorded in session.frames() if recorded.avatar == avatar)
     for recorded, now_ns in islice(stream, start + frames):
-        pack_frame(recorded.frame, packed, 0)
+        pack_frame(recorded.frame, packed.view(np.uint8).data)
         if step_tracking(tracking[0], packed[0], now_ns, tracking_settings) != ACCEPTED:
             continue
         step_body(body[0], tracking[0], body_settings)

@@ -18,7 +18,8 @@ from arm_ik_service.body.profile import Profile
 from arm_ik_service.io.zenoh_bus import BusOptions, open_hub
 from arm_ik_service.programs.service import BATCH, Service
 from arm_ik_service.settings import ServiceSettings, Settings
-from arm_ik_service.wire.messages import ArmsState, ControllerFrame
+from arm_ik_service.wire import codec
+from arm_ik_service.wire.messages import ArmsState, ControllerFrame, Encoding
 
 
 class NoAvatars(Avatars):
@@ -47,7 +48,7 @@ class NoAvatars(Avatars):
         """Solve nothing."""
         self.count = 0
 
-    def answer(
+    def payload(
         self,
         place: int,
         frame: ControllerFrame,
@@ -55,10 +56,11 @@ class NoAvatars(Avatars):
         receive_time_ns: int,
         solve_time_ns: int = 0,
         publish_time_ns: int = 0,
-    ) -> ArmsState:
-        """Return the same arms with this frame's number and times."""
+        encoding: Encoding = "msgpack",
+    ) -> bytes:
+        """Encode the same arms with this frame's number and times."""
         state = self._state
-        return ArmsState(
+        answer = ArmsState(
             version=state.version,
             avatar=avatar,
             seq=frame.seq,
@@ -71,6 +73,7 @@ class NoAvatars(Avatars):
             left=state.left,
             right=state.right,
         )
+        return codec.encode(answer, encoding)
 
 
 def main(endpoint: str, max_avatars: int) -> None:

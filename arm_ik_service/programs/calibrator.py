@@ -27,8 +27,9 @@ def as_records(frames: Iterable[ControllerFrame]) -> np.ndarray[Any, Any]:
     """Return frames as one array of FRAME records (N,)."""
     kept = list(frames)
     records = np.zeros(len(kept), FRAME)
+    buffer = records.view(np.uint8).data
     for index, frame in enumerate(kept):
-        pack_frame(frame, records, index)
+        pack_frame(frame, buffer, index * FRAME.itemsize)
     return records
 
 

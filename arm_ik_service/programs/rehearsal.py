@@ -36,7 +36,7 @@ class Rehearsal:
         )
         place = self._avatars.add(0, frame, self._now_ns)
         self._avatars.step()
-        return codec.encode(self._avatars.answer(place, frame, "rehearsal", self._now_ns), self._encoding)
+        return self._avatars.payload(place, frame, "rehearsal", self._now_ns, encoding=self._encoding)
 
 
 def _frame(swing_m: float) -> ControllerFrame:

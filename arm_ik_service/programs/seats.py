@@ -5,13 +5,29 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+import msgspec
 import numpy as np
 
 from arm_ik_service.body.profile import Profile
 from arm_ik_service.io.zenoh_streams import Stream
-from arm_ik_service.wire.messages import ArmsState, AvatarHealth, TrackingState
+from arm_ik_service.wire.messages import AvatarHealth, TrackingState
 
 _WORST_FIRST: tuple[TrackingState, ...] = ("lost", "held", "inferred", "tracked")
+
+
+class _Hand(msgspec.Struct):
+    """What of an arm its health tells; the rest is skipped while reading."""
+
+    tracking: TrackingState
+    position_error_m: float
+
+
+class _Hands(msgspec.Struct):
+    left: _Hand
+    right: _Hand
+
+
+_hands = msgspec.msgpack.Decoder(_Hands), msgspec.json.Decoder(_Hands)
 
 
 @dataclass(slots=True)
@@ -26,7 +42,6 @@ class Seat:
     answered: int = 0
     overtaken: int = 0
     refused: int = 0
-    last_state: ArmsState | None = None
     last_payload: bytes | None = None  # of the last answer: for whoever joins late or takes over
     latency_max_ns: int = 0
     _before: tuple[int, int, int] = (0, 0, 0)  # answered, overtaken, refused at the last health
@@ -39,7 +54,7 @@ class Seat:
         arrived = answered + overtaken + turned_away
         latency_max_ns = self.latency_max_ns
         self._before, self.latency_max_ns = counts, 0
-        hands = (self.last_state.left, self.last_state.right) if self.last_state is not None else ()
+        hands = self._hands()
         return AvatarHealth(
             avatar=self.name,
             frames_per_s=answered / period_s,
@@ -52,6 +67,13 @@ class Seat:
             position_error_m=max((hand.position_error_m for hand in hands), default=0.0),
             tracking=min((hand.tracking for hand in hands), key=_WORST_FIRST.index, default="lost"),
         )
+
+    def _hands(self) -> tuple[_Hand, ...]:
+        """Both hands as the last answer told them."""
+        if self.last_payload is None:
+            return ()
+        hands = _hands[self.last_payload[:1] == b"{"].decode(self.last_payload)
+        return hands.left, hands.right
 
 
 @dataclass(slots=True)

@@ -235,10 +235,11 @@ class Service:
                 self._refuse(REFUSALS[verdict], f"{seat.name}: seq {frame.seq}", seat)
                 continue
             publish_time_ns = time.time_ns()
-            state = self._avatars.answer(place, frame, seat.name, arrival.receive_time_ns, solve_ns, publish_time_ns)
-            payload = codec.encode(state, encoding)
+            payload = self._avatars.payload(
+                place, frame, seat.name, arrival.receive_time_ns, solve_ns, publish_time_ns, encoding
+            )
             seat.publisher.put(payload)
-            seat.last_state, seat.last_payload = state, payload
+            seat.last_payload = payload
             seat.answered += 1
             self._answered += 1
             latency_ns = publish_time_ns - arrival.receive_time_ns
@@ -374,8 +375,8 @@ class Service:
                 return
             seat.profile = profile
             log.info("avatar %s: measured anew", avatar)
-            if seat.last_state is not None:
-                self._avatars.resume(seat.index, seat.last_state)
+            if seat.last_payload is not None:
+                self._avatars.resume(seat.index, codec.arms_states.decode(seat.last_payload))
             put_once(self._session, self._keys.skeleton(avatar), self._skeleton(seat), self._limits.encoding)
 
     # --- what is told

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import struct
-from typing import Any
 
 import numpy as np
 
@@ -29,17 +28,22 @@ FRAME = record_dtype(
     ]
 )
 
-_LAYOUT = struct.Struct("=2q" + "13d2q" * 3)
-assert _LAYOUT.size == FRAME.itemsize
-_ABSENT = (0.0,) * 6 + (1.0,) + (0.0,) * 6 + (0, 0)
+_HEADER = struct.Struct("=2q")
+_SAMPLE = struct.Struct("=13d2q")
+_HEAD, _LEFT, _RIGHT = (_HEADER.size + n * _SAMPLE.size for n in range(3))
+assert _RIGHT + _SAMPLE.size == FRAME.itemsize
+_ABSENT = _SAMPLE.pack(*(0.0,) * 6, 1.0, *(0.0,) * 6, 0, 0)
 _NO_VELOCITY = (0.0, 0.0, 0.0)
 
 
-def _flat(pose: TrackedPose | None) -> tuple[float, ...]:
+def _pack_sample(pose: TrackedPose | None, buffer: memoryview, at: int) -> None:
     if pose is None:
-        return _ABSENT
+        buffer[at : at + _SAMPLE.size] = _ABSENT
+        return
     linear, angular = pose.linear_velocity, pose.angular_velocity
-    return (
+    _SAMPLE.pack_into(
+        buffer,
+        at,
         *pose.position,
         *pose.orientation,
         *(linear or _NO_VELOCITY),
@@ -49,14 +53,13 @@ def _flat(pose: TrackedPose | None) -> tuple[float, ...]:
     )
 
 
-def pack_frame(frame: ControllerFrame, frames: np.ndarray[Any, Any], index: int) -> None:
-    """Write a decoded message into `frames[index]` of dtype FRAME; one packing call, no numpy scalar."""
-    _LAYOUT.pack_into(
-        frames.data,
-        index * FRAME.itemsize,
-        frame.seq,
-        frame.sample_time_ns,
-        *_flat(frame.head),
-        *_flat(frame.left),
-        *_flat(frame.right),
-    )
+def pack_frame(frame: ControllerFrame, buffer: memoryview, at: int = 0) -> None:
+    """Write a decoded message as a record of dtype FRAME into bytes, from byte `at` on.
+
+    The bytes of an array of records are `records.view(np.uint8).data`. Not `records.data`: numpy spells out the whole
+    dtype for it, which takes ten times as long as the rest.
+    """
+    _HEADER.pack_into(buffer, at, frame.seq, frame.sample_time_ns)
+    _pack_sample(frame.head, buffer, at + _HEAD)
+    _pack_sample(frame.left, buffer, at + _LEFT)
+    _pack_sample(frame.right, buffer, at + _RIGHT)

@@ -11,13 +11,22 @@ from typing import Any, Generic, TypeVar
 import msgspec
 
 from arm_ik_service.errors import DecodeError, VersionError
-from arm_ik_service.wire.messages import VERSION, ArmsState, ControllerFrame, Encoding, Health, Skeleton
+from arm_ik_service.wire.messages import (
+    VERSION,
+    ArmsHeader,
+    ArmsState,
+    ControllerFrame,
+    Encoding,
+    Health,
+    Skeleton,
+)
 
 MEDIA_TYPES: dict[Encoding, str] = {"msgpack": "application/msgpack", "json": "application/json"}
 
 Message = TypeVar("Message")
 _encode_msgpack = msgspec.msgpack.Encoder().encode
 _encode_json = msgspec.json.Encoder().encode
+_ARMS_STATE_MAP = bytes([0x80 | len(ArmsState.__struct_fields__)])  # a map of so many fields
 
 
 class _Header(msgspec.Struct):
@@ -65,6 +74,11 @@ healths = Decoder(Health)
 def encode(message: msgspec.Struct, encoding: Encoding = "msgpack") -> bytes:
     """Return the bytes of a message."""
     return _encode_msgpack(message) if encoding == "msgpack" else _encode_json(message)
+
+
+def join(header: ArmsHeader, body: bytes | memoryview) -> bytes:
+    """Return the MessagePack of an ArmsState whose fields after the header are `body` already."""
+    return b"".join((_ARMS_STATE_MAP, _encode_msgpack(header)[1:], body))
 
 
 def json_schema(kind: type[msgspec.Struct]) -> dict[str, Any]:

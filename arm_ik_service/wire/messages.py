@@ -113,8 +113,8 @@ class ArmState(Struct, frozen=True):
     elbow_confidence: float  # 0: any swivel is as comfortable; 1: the comfort is sharp
 
 
-class ArmsState(Struct, frozen=True):
-    """The answer to one ControllerFrame, on `avatar/<id>/arms`; `seq` and `sample_time_ns` are the frame's."""
+class ArmsHeader(Struct, frozen=True):
+    """Which frame an answer is to, and when it passed where; `seq` and `sample_time_ns` are the frame's."""
 
     version: int
     avatar: str
@@ -123,6 +123,11 @@ class ArmsState(Struct, frozen=True):
     receive_time_ns: Nanoseconds  # the service's wall clock when the frame reached it
     solve_time_ns: Nanoseconds  # a duration: decode to solved
     publish_time_ns: Nanoseconds  # the service's wall clock when it put this message
+
+
+class ArmsState(ArmsHeader, frozen=True):
+    """The answer to one ControllerFrame, on `avatar/<id>/arms`."""
+
     chest: Pose
     head: Pose
     left: ArmState

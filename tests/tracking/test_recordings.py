@@ -30,7 +30,7 @@ def frames_of(path: Path) -> Records:
     recorded = list(open_session(path).frames())
     frames = np.zeros(len(recorded), FRAME)
     for k, one in enumerate(recorded):
-        pack_frame(one.frame, frames, k)
+        pack_frame(one.frame, frames.view(np.uint8).data, k * FRAME.itemsize)
     return frames
 
 

@@ -17,8 +17,17 @@ from arm_ik_service.geometry import scalar as g
 from arm_ik_service.ik.registry import SolverChoice, make_solver
 from arm_ik_service.ik.step import limits_at
 from arm_ik_service.ik.velocity import difference
-from arm_ik_service.output import OUTPUT, read_output
-from arm_ik_service.wire.messages import SIDES, VERSION, ArmsState, ControllerFrame, Side, TrackedPose
+from arm_ik_service.output.message import read_output
+from arm_ik_service.output.record import OUTPUT
+from arm_ik_service.wire.messages import (
+    SIDES,
+    VERSION,
+    ArmsHeader,
+    ArmsState,
+    ControllerFrame,
+    Side,
+    TrackedPose,
+)
 
 Floats = npt.NDArray[np.float64]
 
@@ -105,11 +114,7 @@ class Figure:
             _tracked(batch.compose(hands["left"], [*left.position_m, *left.orientation_xyzw])),
             _tracked(batch.compose(hands["right"], [*right.position_m, *right.orientation_xyzw])),
         )
-        arms = read_output(
-            *(self._output, 0), avatar=self.avatar, seq=seq, sample_time_ns=time_ns,
-            receive_time_ns=time_ns, solve_time_ns=0, publish_time_ns=0,
-        )  # fmt: skip
-        return frame, arms
+        return frame, read_output(self._output, ArmsHeader(VERSION, self.avatar, seq, time_ns, time_ns, 0, 0))
 
     def _pose_arm(self, out: np.record, side: Side, chest: Floats, hand: Floats, advance: Floats, dt: float) -> None:
         model, before = self.arms[side], self._configurations[side]
@@ -132,7 +137,7 @@ class Figure:
         out.isb_singular = isb_shoulder(out.configuration, out.isb)
         out.limits = limits_at(model.chains[0], solution.configuration)
         out.reach_ratio = np.linalg.norm(target[:3]) / self.arm_length
-        out.position_state = out.rotation_state = TRACKED
+        out.state = out.position_state = out.rotation_state = TRACKED
         out.iterations = solution.iterations
         self._configurations[side] = solution.configuration
 
