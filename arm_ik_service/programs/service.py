@@ -9,30 +9,28 @@ from __future__ import annotations
 
 import gc
 import logging
-import os
 import time
 from collections.abc import Callable, Iterator
 from functools import partial
-from pathlib import Path
 from threading import Lock
 
 import msgspec
 
-import arm_ik_service
 from arm_ik_service.avatar import Avatars
 from arm_ik_service.body.profile import Profile
 from arm_ik_service.errors import DecodeError, ModelError, ProfileError, VersionError, WireError
 from arm_ik_service.io.zenoh_inbox import Arrival, Inbox, InboxLimits
-from arm_ik_service.io.zenoh_streams import Bus, answer_queries, declare_stream, put_once, query_later, subscribe
+from arm_ik_service.io.zenoh_streams import Bus, answer_queries, declare_stream, put_once, subscribe
 from arm_ik_service.programs.fleet import Fleet
+from arm_ik_service.programs.look_out import LookOut, decode_profile
 from arm_ik_service.programs.rehearsal import Rehearsal
-from arm_ik_service.programs.seats import Latencies, Seat
+from arm_ik_service.programs.seats import Seat
+from arm_ik_service.programs.tally import Tally
 from arm_ik_service.settings import Settings
 from arm_ik_service.skeleton import skeleton_of
 from arm_ik_service.tracking.state import ACCEPTED, REFUSALS
 from arm_ik_service.wire import codec
 from arm_ik_service.wire.keys import Keys
-from arm_ik_service.wire.messages import VERSION, Health
 
 log = logging.getLogger("arm_ik.service")
 
@@ -43,10 +41,6 @@ BATCH = 8  # frames solved by one call: more saves little per frame and delays t
 BACK_TO_BACK_NS = 50_000  # between the end of one and the next: it had been waiting
 MOST_BACK_TO_BACK = 3
 SPEAKING_S = 0.5  # after its last frame somebody is expected to send another
-# look-outs: how often the others are asked for their avatars' profiles, which may change, and how often at the most for
-# those of somebody new
-CALIBRATIONS_EVERY, NEW_CALIBRATIONS_EVERY = 16, 4
-_profiles = msgspec.msgpack.Decoder(Profile), msgspec.json.Decoder(Profile)
 
 
 class Service:
@@ -71,18 +65,8 @@ class Service:
         skeleton_of(name, profile)
         self._free = list(range(limits.max_avatars - 1, -1, -1))
         self._seats: dict[str, Seat] = {}
-        self._others_profiles: dict[str, Profile] = {}
-        self._refused: dict[str, int] = {}
-        self._details: dict[str, tuple[int, str]] = {}
-        self._answered = 0
-        self._overtaken = 0
-        self._before = (0, 0, 0)  # answered, overtaken, refused at the last health
-        self._latencies = Latencies()
-        self._started_s = time.monotonic()
-        self._health_at_s = self._started_s
-        self._look_outs = 0
-        self._looking_out = False
-        self._look_out_at_s = float("inf")
+        self._tally = Tally()
+        self._health_at_s = time.monotonic()
         self._services_changed = False
         self._working = Lock()  # held by whoever touches avatars and seats
         self._ended_ns = 0  # when the last frame was answered
@@ -103,6 +87,7 @@ class Service:
             self._fleet.owns,
             self._answer_now,
         )
+        self._look_out = LookOut(session, self._keys, limits, self._inbox, self._seats.__contains__)
         self._health = declare_stream(session, self._keys.health(name), limits.encoding)
         self._queryables = [
             answer_queries(session, key, partial(self._of_everybody, *made), limits.encoding)
@@ -125,7 +110,7 @@ class Service:
             self._fleet.join()
             return
         self._inbox.look_out()
-        self._ask_for_calibrations()
+        self._look_out.ask_for_calibrations()
         self._fleet.join()
         time.sleep(self._limits.hand_over_s)
         self._services_changed = True
@@ -149,8 +134,8 @@ class Service:
                         self._answer(arrivals)
                         self._ended_ns = time.perf_counter_ns()
                     now_s = time.monotonic()
-                    if now_s >= self._look_out_at_s:
-                        self._look_out(now_s)
+                    if now_s >= self._look_out.due_s:
+                        self._look_out.turn(now_s)
                     if now_s >= self._health_at_s:
                         self._publish_health()
                         gc.collect(1)
@@ -162,7 +147,7 @@ class Service:
         """For how long there is nothing to do but to wait for frames; rehearses first if that is due."""
         if self._services_changed:
             return 0.0
-        due_s = min(self._health_at_s, self._look_out_at_s) - time.monotonic()
+        due_s = min(self._health_at_s, self._look_out.due_s) - time.monotonic()
         if self._rehearsal is None:
             return due_s
         every_s = self._limits.rehearse_every_s
@@ -207,18 +192,15 @@ class Service:
         batch = []
         for arrival in arrivals:
             seat = self._seats.get(arrival.avatar)
-            self._overtaken += arrival.overtaken
-            if seat is not None:
-                seat.last_arrival_ns = arrival.receive_time_ns
-                seat.overtaken += arrival.overtaken
+            self._tally.arrived(seat, arrival.receive_time_ns, arrival.overtaken)
             assert arrival.payload is not None
             try:
                 frame = codec.controller_frames.decode(arrival.payload)
             except DecodeError as error:
-                self._refuse("malformed", f"{arrival.avatar}: {error}", seat)
+                self._tally.refused("malformed", f"{arrival.avatar}: {error}", seat)
                 continue
             except VersionError as error:
-                self._refuse("version", f"{arrival.avatar}: {error}", seat)
+                self._tally.refused("version", f"{arrival.avatar}: {error}", seat)
                 continue
             # a place is for whoever speaks our language: noise on a thousand keys takes none
             seat = seat or self._seat(arrival)
@@ -232,19 +214,14 @@ class Service:
         for seat, frame, arrival, place in batch:
             verdict = int(self._avatars.verdicts[place])
             if verdict != ACCEPTED:
-                self._refuse(REFUSALS[verdict], f"{seat.name}: seq {frame.seq}", seat)
+                self._tally.refused(REFUSALS[verdict], f"{seat.name}: seq {frame.seq}", seat)
                 continue
             publish_time_ns = time.time_ns()
             payload = self._avatars.payload(
                 place, frame, seat.name, arrival.receive_time_ns, solve_ns, publish_time_ns, encoding
             )
             seat.publisher.put(payload)
-            seat.last_payload = payload
-            seat.answered += 1
-            self._answered += 1
-            latency_ns = publish_time_ns - arrival.receive_time_ns
-            seat.latency_max_ns = max(seat.latency_max_ns, latency_ns)
-            self._latencies.add(latency_ns)
+            self._tally.answered(seat, payload, publish_time_ns - arrival.receive_time_ns)
 
     def _seat(self, arrival: Arrival) -> Seat | None:
         """Give an avatar a row, a publisher and its skeleton on the bus; where another served it, go on from there."""
@@ -252,10 +229,10 @@ class Service:
         if not self._fleet.owns(name):
             return None  # it arrived before it was given up
         if not self._free:
-            self._refuse("too_many_avatars", f"{name}: {self._limits.max_avatars} are served")
+            self._tally.refused("too_many_avatars", f"{name}: {self._limits.max_avatars} are served")
             return None
         index = self._free.pop()
-        profile = self._others_profiles.pop(name, self._profile)
+        profile = self._look_out.take_profile(name) or self._profile
         try:
             self._avatars.reset(index, profile)
         except (ModelError, ProfileError) as error:
@@ -309,15 +286,12 @@ class Service:
         for seat in given_up:
             self._stand_up(seat, lives_on=True)
         gained = [avatar for avatar in self._inbox.others() if self._fleet.owns(avatar)]
-        self._looking_out = False
         if self._fleet.alone:
-            self._inbox.end_look_out(hear_everybody=True)
-            self._look_out_at_s = float("inf")
+            self._look_out.end()
         else:
             for avatar in (*self._seats, *gained):
                 self._inbox.hear(avatar)
-            self._inbox.end_look_out()
-            self._look_out_at_s = time.monotonic()
+            self._look_out.begin_again(time.monotonic())
         log.info(
             "services: %s; %d avatars given up, %d taken over",
             ", ".join(sorted(self._fleet.services)),
@@ -325,52 +299,23 @@ class Service:
             len(gained),
         )
 
-    def _look_out(self, now_s: float) -> None:
-        """Begin or end a moment of hearing everybody."""
-        if self._looking_out:
-            self._inbox.end_look_out()
-            self._look_out_at_s = now_s + self._limits.look_out_period_s - self._limits.look_out_s
-        else:
-            self._inbox.look_out()
-            self._look_out_at_s = now_s + self._limits.look_out_s
-            somebody_new = self._look_outs % NEW_CALIBRATIONS_EVERY == 0 and any(
-                avatar not in self._others_profiles for avatar in self._inbox.others()
-            )
-            if somebody_new or self._look_outs % CALIBRATIONS_EVERY == 0:
-                self._ask_for_calibrations()
-            self._look_outs += 1
-        self._looking_out = not self._looking_out
-
-    def _ask_for_calibrations(self) -> None:
-        query_later(self._session, self._keys.calibration(), self._note_calibration)
-
-    def _note_calibration(self, key: str, payload: bytes) -> None:
-        """Run on a Zenoh thread: keep another's profile for the day its avatar is ours."""
-        avatar = self._keys.avatar_of(key)
-        if avatar in self._seats or len(self._others_profiles) >= 16 * self._limits.max_avatars:
-            return
-        try:
-            self._others_profiles[avatar] = _profiles[payload[:1] == b"{"].decode(payload)
-        except (msgspec.MsgspecError, UnicodeDecodeError):
-            log.warning("avatar %s: a calibration that cannot be read", avatar)
-
     def _take_calibration(self, key: str, payload: bytes, _time_ns: int) -> None:
         """Run on a Zenoh thread: somebody was measured; from the next frame on they have these measures."""
         avatar = self._keys.avatar_of(key)
         with self._working:
             seat = self._seats.get(avatar)
             if seat is None:
-                self._note_calibration(key, payload)
+                self._look_out.note_calibration(key, payload)
                 return
             try:
-                profile = _profiles[payload[:1] == b"{"].decode(payload)
+                profile = decode_profile(payload)
             except (msgspec.MsgspecError, UnicodeDecodeError) as error:
-                self._refuse("calibration", f"{avatar}: {error}", seat)
+                self._tally.refused("calibration", f"{avatar}: {error}", seat)
                 return
             try:
                 self._avatars.reset(seat.index, profile)
             except (ModelError, ProfileError) as error:
-                self._refuse("calibration", f"{avatar}: {error}", seat)
+                self._tally.refused("calibration", f"{avatar}: {error}", seat)
                 self._avatars.reset(seat.index, seat.profile)
                 return
             seat.profile = profile
@@ -381,45 +326,16 @@ class Service:
 
     # --- what is told
 
-    def _refuse(self, cause: str, detail: str, seat: Seat | None = None, count: int = 1) -> None:
-        self._refused[cause] = self._refused.get(cause, 0) + count
-        self._details[cause] = (self._details.get(cause, (0, ""))[0] + count, detail)
-        if seat is not None:
-            seat.refused += count
-
     def _publish_health(self) -> None:
         """Publish and log what the last period brought; called between frames."""
         for cause, (count, detail) in self._inbox.take_refused().items():
-            self._refuse(cause, detail, count=count)
-        for cause, (count, detail) in self._details.items():
-            log.warning("refused %d frame(s), %s; the last: %s", count, cause, detail)
-        self._details.clear()
+            self._tally.refused(cause, detail, count=count)
+        self._tally.log_refused()
         now_ns = time.time_ns()
         self._forget_silent(now_ns)
-        p50_ms, p99_ms = self._latencies.take_ms()
         period_s = self._limits.health_period_s
-        counts = (self._answered, self._overtaken, sum(self._refused.values()))
-        answered, overtaken, refused = (count - before for count, before in zip(counts, self._before, strict=True))
-        self._before = counts
-        arrived = answered + overtaken + refused
-        health = Health(
-            version=VERSION,
-            service=self._name,
-            software=f"arm-ik-service {arm_ik_service.__version__}",
-            time_ns=now_ns,
-            uptime_s=time.monotonic() - self._started_s,
-            answered=self._answered,
-            overtaken=self._overtaken,
-            refused=dict(self._refused),
-            latency_p50_ms=p50_ms,
-            latency_p99_ms=p99_ms,
-            avatars=tuple(
-                seat.health(now_ns, period_s, self._inbox.refused_of(seat.name)) for seat in self._seats.values()
-            ),
-            answered_share=answered / arrived if arrived else 1.0,
-            services=tuple(sorted(self._fleet.services)),
-            memory_bytes=_resident_bytes(),
-        )
+        avatars = (seat.health(now_ns, period_s, self._inbox.refused_of(seat.name)) for seat in self._seats.values())
+        health = self._tally.health(self._name, now_ns, avatars, self._fleet.services)
         self._health.put(codec.encode(health, self._limits.encoding))
         # an absolute schedule, but never a burst of healths after a stall
         self._health_at_s = max(self._health_at_s + period_s, time.monotonic())
@@ -439,12 +355,4 @@ class Service:
 
     def farewell(self) -> str:
         """Return one line that says what was served."""
-        refused = ", ".join(f"{count} {cause}" for cause, count in self._refused.items()) or "none"
-        return f"answered {self._answered} frames, overtaken {self._overtaken}, refused: {refused}"
-
-
-def _resident_bytes() -> int:
-    try:
-        return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
-    except (OSError, ValueError, AttributeError):
-        return 0
+        return self._tally.farewell()
