@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from arm_ik_service.arm.model import ArmModel
     from arm_ik_service.avatar import Avatar, Avatars
-    from arm_ik_service.body.profile import Profile, load_profile
+    from arm_ik_service.body.profile import Profile
     from arm_ik_service.ik.jacobian_transpose import JacobianTranspose
+    from arm_ik_service.io.profile_store import load_profile
     from arm_ik_service.settings import Settings, load_settings
     from arm_ik_service.wire.messages import ArmsState, ControllerFrame, TrackedPose
 
@@ -31,7 +32,7 @@ _HOMES = {
     "Profile": "body.profile",
     "Settings": "settings",
     "TrackedPose": "wire.messages",
-    "load_profile": "body.profile",
+    "load_profile": "io.profile_store",
     "load_settings": "settings",
 }
 __all__ = [

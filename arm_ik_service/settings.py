@@ -65,6 +65,9 @@ class ServiceSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     # of one avatar: the fastest trackers give 1000 poses a second; what comes beyond is dropped before it is decoded
     max_frames_per_s: Annotated[float, Meta(ge=1.0)] = 1000.0
     rate_burst_s: Annotated[float, Meta(ge=0.1)] = 2.0  # so many seconds' frames may come at once, after a stall
+    # Wireless links that deliver several frames at once: each waits up to so long, so that they come out as they were
+    # sampled. The delay this adds is the whole of it for a frame that was on time; nothing where it is 0.
+    jitter_buffer_s: Annotated[float, Meta(ge=0.0, le=0.25)] = 0.0
     max_id_length: Annotated[int, Meta(ge=1, le=255)] = 64  # an id is also a file name and an entity path
     forget_after_s: Annotated[float, Meta(gt=0.0)] = 60.0  # a silent avatar gives its row back
     health_period_s: Annotated[float, Meta(ge=0.1)] = 1.0

@@ -8,13 +8,11 @@ Control of Human Movement, table 4.1.
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import Annotated
 
 import msgspec
 from msgspec import Meta
 
-from arm_ik_service.errors import ProfileError
 from arm_ik_service.wire.messages import Quaternion, Vector
 
 Length = Annotated[float, Meta(gt=0.0, lt=2.0)]
@@ -114,15 +112,3 @@ class Profile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     body: BodyMeasures = BodyMeasures()
     grip: Grips = Grips()
     limits_deg: RangesOfMotion = RangesOfMotion()
-
-
-def load_profile(path: Path | None) -> Profile:
-    """Read a profile; None gives the person of average stature. Raises ProfileError naming the file and the field."""
-    if path is None:
-        return Profile()
-    try:
-        return msgspec.toml.decode(path.read_bytes(), type=Profile)
-    except OSError as error:
-        raise ProfileError(f"profile {path}: {error.strerror}") from error
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise ProfileError(f"profile {path}: {error}") from error

@@ -44,8 +44,8 @@ def check(
 
     from rich.console import Console as Terminal
 
-    from arm_ik_service.body.profile_store import find_profile
     from arm_ik_service.cli.progress import frames_progress
+    from arm_ik_service.io.profile_store import find_profile
     from arm_ik_service.io.session import open_session
     from arm_ik_service.programs.checker import check_avatar
     from arm_ik_service.programs.offline import profile_for

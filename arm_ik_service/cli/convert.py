@@ -53,7 +53,7 @@ def convert(
         raise SessionError(f"{output}: is the session itself; write to another file")
     with frames_progress(session.name, recording.frame_count) as progress:
         if arms:
-            from arm_ik_service.body.profile_store import find_profile
+            from arm_ik_service.io.profile_store import find_profile
             from arm_ik_service.programs.export_session import export_session
             from arm_ik_service.settings import load_settings
 

@@ -48,9 +48,9 @@ def grab(
     """
     import numpy as np
 
-    from arm_ik_service.body.profile_store import find_profile
     from arm_ik_service.errors import SettingsError
     from arm_ik_service.ik.registry import parse_solver
+    from arm_ik_service.io.profile_store import find_profile
     from arm_ik_service.io.rerun_view import Save, Sink, Spawn, has_display
     from arm_ik_service.io.zenoh_bus import open_hub
     from arm_ik_service.programs.grab.live import GrabShow

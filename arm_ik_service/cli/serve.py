@@ -36,8 +36,8 @@ def serve(
     import socket
     import time
 
-    from arm_ik_service.body.profile_store import find_profile
     from arm_ik_service.cli.warm_up import warm_up
+    from arm_ik_service.io.profile_store import find_profile
     from arm_ik_service.io.zenoh_bus import open_hub
     from arm_ik_service.io.zenoh_log import log_zenoh
     from arm_ik_service.settings import load_settings

@@ -37,8 +37,8 @@ def solve(
     """
     import json
 
-    from arm_ik_service.body.profile_store import find_profile
     from arm_ik_service.errors import SettingsError
+    from arm_ik_service.io.profile_store import find_profile
     from arm_ik_service.io.session import open_session
     from arm_ik_service.settings import load_settings
 

@@ -18,6 +18,7 @@ from threading import Lock
 import zenoh
 
 from arm_ik_service.errors import WireError
+from arm_ik_service.io.jitter_buffer import JitterBuffer, Pace
 from arm_ik_service.wire.keys import Keys, check_id
 
 _WAKE = ""  # no avatar's id
@@ -43,6 +44,7 @@ class InboxLimits:
     max_avatars: int
     max_frames_per_s: float
     rate_burst_s: float
+    jitter_buffer_s: float = 0.0
 
 
 @dataclass(slots=True)
@@ -53,6 +55,7 @@ class _Door:
     due_ns: int = 0  # the time at which it has used up what it may send until then (generic cell rate algorithm)
     last_ns: int = 0
     refused: int = 0
+    pace: Pace = field(default_factory=Pace)  # for the jitter buffer
 
 
 @dataclass(slots=True)
@@ -74,7 +77,7 @@ class Inbox:
         owns: Callable[[str], bool],
         answer_now: Callable[[Arrival], bool] | None = None,
     ) -> None:
-        """Both callables run on Zenoh's network threads.
+        """Both callables run on Zenoh's network threads, or the jitter buffer's.
 
         `owns` is asked once for an avatar until `forget_owners`. `answer_now` is offered a frame before which none
         waits, and says whether it is done with.
@@ -95,6 +98,7 @@ class Inbox:
         self._refused: dict[str, tuple[int, str]] = {}
         self._others = _Others()
         self._own_subscribers: dict[str, zenoh.Subscriber[None]] = {}  # by key
+        self._buffer = JitterBuffer(limits.jitter_buffer_s, self._deliver_now) if limits.jitter_buffer_s else None
         self._everybody: zenoh.Subscriber[None] | None = None
         self._answers: zenoh.Subscriber[None] | None = None
 
@@ -203,8 +207,17 @@ class Inbox:
         if len(payload) > self._limits.max_message_bytes:
             self._refuse("too_large", f"{door.avatar}: {len(payload)} bytes", door)
             return
-        avatar = door.avatar
-        arrival = Arrival(avatar, payload.to_bytes(), receive_time_ns, 0)
+        if self._buffer is None:
+            self._deliver(Arrival(door.avatar, payload.to_bytes(), receive_time_ns, 0))
+        elif not self._buffer.hold(door.pace, door.avatar, payload.to_bytes()):
+            self._refuse("jitter_buffer", f"{door.avatar}: too many frames at once", door)
+
+    def _deliver_now(self, avatar: str, payload: bytes) -> None:
+        """Run on the jitter buffer's thread. A frame counts as received when it leaves the buffer: so it is solved."""
+        self._deliver(Arrival(avatar, payload, time.time_ns(), 0))
+
+    def _deliver(self, arrival: Arrival) -> None:
+        avatar = arrival.avatar
         if not self._slots and self._answer_now is not None and self._answer_now(arrival):
             return
         with self._lock:
@@ -212,7 +225,7 @@ class Inbox:
             if slot is None:
                 self._slots[avatar] = arrival
             else:
-                slot.payload, slot.receive_time_ns = arrival.payload, receive_time_ns
+                slot.payload, slot.receive_time_ns = arrival.payload, arrival.receive_time_ns
                 slot.overtaken += 1
                 return
         self._ready.put(avatar)
@@ -315,3 +328,5 @@ class Inbox:
         for subscriber in self._own_subscribers.values():
             subscriber.undeclare()
         self._own_subscribers.clear()
+        if self._buffer is not None:
+            self._buffer.close()

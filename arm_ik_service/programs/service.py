@@ -83,6 +83,7 @@ class Service:
                 max_avatars=limits.max_avatars,
                 max_frames_per_s=limits.max_frames_per_s,
                 rate_burst_s=limits.rate_burst_s,
+                jitter_buffer_s=limits.jitter_buffer_s,
             ),
             self._fleet.owns,
             self._answer_now,

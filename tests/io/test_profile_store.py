@@ -13,10 +13,16 @@ from arm_ik_service.body.profile import (
     BodyMeasures,
     Profile,
     RangesOfMotion,
-    load_profile,
 )
-from arm_ik_service.body.profile_store import find_profile, profile_names, profile_path, profile_toml, save_profile
 from arm_ik_service.errors import ProfileError
+from arm_ik_service.io.profile_store import (
+    find_profile,
+    load_profile,
+    profile_names,
+    profile_path,
+    profile_toml,
+    save_profile,
+)
 
 lengths = st.one_of(st.none(), st.integers(50, 1999).map(lambda mm: mm / 1000.0))
 

@@ -11,7 +11,7 @@ from typing import Any
 import msgspec
 import platformdirs
 
-from arm_ik_service.body.profile import Profile, load_profile
+from arm_ik_service.body.profile import Profile
 from arm_ik_service.errors import ProfileError
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")  # a file name anywhere
@@ -42,6 +42,18 @@ def profile_names() -> list[str]:
     """Names of the profiles in the user's folder."""
     folder = profile_folder()
     return sorted(path.stem for path in folder.glob("*.toml")) if folder.is_dir() else []
+
+
+def load_profile(path: Path | None) -> Profile:
+    """Read a profile; None gives the person of average stature. Raises ProfileError naming the file and the field."""
+    if path is None:
+        return Profile()
+    try:
+        return msgspec.toml.decode(path.read_bytes(), type=Profile)
+    except OSError as error:
+        raise ProfileError(f"profile {path}: {error.strerror}") from error
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise ProfileError(f"profile {path}: {error}") from error
 
 
 def find_profile(name_or_path: str | None) -> Profile:
