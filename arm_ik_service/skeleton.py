@@ -7,18 +7,27 @@ from functools import lru_cache
 import numpy as np
 
 from arm_ik_service.arm.model import ANGLES, LIMITS, ArmModel
-from arm_ik_service.body.profile import GripOffset, Profile
-from arm_ik_service.wire.messages import VERSION, JointLimit, Pose, Skeleton
+from arm_ik_service.body.profile import GripOffset, Profile, RangesOfMotion
+from arm_ik_service.geometry import batch
+from arm_ik_service.wire.messages import VERSION, JointLimit, Pose, Skeleton, SwingRegion
+
+EDGE_POINTS = 36  # of the swing region: every 10 degrees of azimuth, the edge being a series of four harmonics
 
 
 @lru_cache(maxsize=64)
-def _joint_limits() -> tuple[JointLimit, ...]:
-    model = ArmModel.load()
+def _limits(ranges_of_motion: RangesOfMotion) -> tuple[tuple[JointLimit, ...], SwingRegion]:
+    model = ArmModel.load(limits=ranges_of_motion.in_radians())
     flexion, abduction = model.swing_range
     ranges = [flexion, abduction, model.twist_range, *zip(model.lower, model.upper, strict=True)]
-    return tuple(
+    limits = tuple(
         JointLimit(name, *np.asarray(limits, float).tolist()) for name, limits in zip(ANGLES, ranges, strict=True)
     )
+    azimuth = np.linspace(0.0, 2.0 * np.pi, EDGE_POINTS, endpoint=False)
+    chain, away = model.chains[0], model.swing_edge(azimuth)[:, None]
+    aside = np.cos(azimuth)[:, None] * chain.swing_side + np.sin(azimuth)[:, None] * chain.swing_up
+    isb = np.concatenate([[chain.swing_centre], np.cos(away) * chain.swing_centre + np.sin(away) * aside])
+    centre, *edge = (tuple(direction) for direction in batch.rotate(chain.shoulder_from_isb, isb).tolist())
+    return limits, SwingRegion(centre, tuple(edge))
 
 
 def _pose(offset: GripOffset) -> Pose:
@@ -28,6 +37,7 @@ def _pose(offset: GripOffset) -> Pose:
 def skeleton_of(avatar: str, profile: Profile) -> Skeleton:
     """Describe one avatar. Raises ModelError where the model file cannot be read."""
     body = profile.body
+    limits, swing = _limits(profile.limits_deg)
     return Skeleton(
         version=VERSION,
         avatar=avatar,
@@ -36,8 +46,9 @@ def skeleton_of(avatar: str, profile: Profile) -> Skeleton:
         upper_arm_m=body.upper_arm,
         forearm_m=body.forearm,
         hand_m=body.hand,
-        joint_limits=_joint_limits(),
+        joint_limits=limits,
         limit_names=LIMITS,
         left_wrist_from_grip=_pose(profile.grip.left),
         right_wrist_from_grip=_pose(profile.grip.right),
+        shoulder_swing=swing,
     )

@@ -18,8 +18,13 @@ LEGEND_HEIGHT = 0.075
 Views = list["rrb.View | rrb.Container"]
 
 
-def eye_in_front_of(chests: Sequence[Pose]) -> archetypes.EyeControls3D:
-    """Look at all of these people from the front of the first, a little from above and from their left."""
+def eye_in_front_of(
+    chests: Sequence[Pose], follow: str | None = None, *, whole: bool = False
+) -> archetypes.EyeControls3D:
+    """Look at all of these people from the front of the first, a little from above and from their left.
+
+    At the `whole` of them, or at what is above the hips. The eye goes along with the entity `follow`.
+    """
     positions = [chest.position for chest in chests]
     middle = tuple(sum(p[k] for p in positions) / len(positions) for k in range(3))
     spread = max(abs(p[k] - middle[k]) for p in positions for k in (0, 2))
@@ -27,11 +32,15 @@ def eye_in_front_of(chests: Sequence[Pose]) -> archetypes.EyeControls3D:
     forward[1] = 0.0
     forward = batch.normalized(forward if float(forward @ forward) > 1e-6 else (0.0, 0.0, -1.0))
     left = (forward[2], 0.0, -forward[0])
-    distance = 1.40 + 1.6 * spread
+    distance = (2.3 if whole else 1.40) + 1.6 * spread
     position = [middle[k] + distance * forward[k] + 0.22 * distance * left[k] for k in range(3)]
     position[1] = middle[1] + 0.28 * distance
     return archetypes.EyeControls3D(
-        kind=rrb.Eye3DKind.Orbital, position=position, look_target=_raised(middle, -0.14), eye_up=(0.0, 1.0, 0.0)
+        kind=rrb.Eye3DKind.Orbital,
+        position=position,
+        look_target=_raised(middle, -0.5 if whole else -0.14),
+        eye_up=(0.0, 1.0, 0.0),
+        tracking_entity=follow,
     )
 
 
@@ -78,17 +87,18 @@ def _plots(root: str, name: str) -> rrb.Container:
     )
 
 
-def blueprint_of(roots: dict[str, str], chests: Sequence[Pose]) -> rrb.Blueprint:
+def blueprint_of(roots: dict[str, str], chests: Sequence[Pose], *, whole: bool = False) -> rrb.Blueprint:
     """Lay out the avatars `roots`: id -> entity; `chests` are where they are now, for the eye.
 
     One avatar has its plots beside it; of many, all stand in one picture and each has a tab of plots.
     """
+    followed = f"{next(iter(roots.values()))}/chest" if len(roots) == 1 else None
     people = rrb.Vertical(
         rrb.Spatial3DView(
             origin="/",
             contents="/**",
             name="arms",
-            eye_controls=eye_in_front_of(chests),
+            eye_controls=eye_in_front_of(chests, followed, whole=whole),
             background=archetypes.Background(color=(24, 27, 33)),
             line_grid=archetypes.LineGrid3D(visible=True, spacing=0.5, stroke_width=0.5, color=(150, 160, 180, 60)),
         ),

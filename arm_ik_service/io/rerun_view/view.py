@@ -15,7 +15,8 @@ import rerun as rr
 from arm_ik_service.errors import ViewError
 from arm_ik_service.io.rerun_view.blueprint import blueprint_of
 from arm_ik_service.io.rerun_view.entities import Sender, entity_of, log_name, log_styles, skeleton_of
-from arm_ik_service.io.rerun_view.props import Box
+from arm_ik_service.io.rerun_view.overlays import Overlay
+from arm_ik_service.io.rerun_view.props import Box, Legs
 from arm_ik_service.io.rerun_view.rows import Rows
 from arm_ik_service.io.rerun_view.sinks import Save, Sink, attach, first_line
 from arm_ik_service.io.rerun_view.skinned import Skin
@@ -49,10 +50,17 @@ class RerunView:
     Timelines: `frame` (seq) and `sample_time` (duration). Nothing is sent before `flush`, `close`, or BATCH_ROWS rows.
     """
 
-    def __init__(self, *sinks: Sink, name: str = "", spacing_m: float = 0.0, skin: Skin | None = None) -> None:
+    def __init__(
+        self,
+        *sinks: Sink,
+        name: str = "",
+        spacing_m: float = 0.0,
+        skin: Skin | None = None,
+        show: frozenset[Overlay] = frozenset(),
+    ) -> None:
         """Open the sinks; `name` titles the recording, `spacing_m` sets avatars apart that share one origin.
 
-        With a `skin` everybody is drawn as that character; without, as solids.
+        With a `skin` everybody is drawn as that character; without, as solids. `show` adds what explains the arms.
 
         Raises ViewError.
         """
@@ -61,8 +69,11 @@ class RerunView:
         self.watched = not all(isinstance(sink, Save) for sink in sinks)  # somebody looks on
         self._spacing_m = spacing_m
         self._skin = skin
+        self._show = show
         self._people: dict[str, _Person] = {}
         self._boxes: list[Box] = []
+        self._legs: list[Legs] = []
+        self._whole = skin is not None and not skin.arms_only  # people are seen down to their feet
         self._described: dict[str, Skeleton] = {}
         if name:
             self._recording.send_recording_name(name)
@@ -91,12 +102,20 @@ class RerunView:
         self._boxes.append(Box(self._recording, name, edge_m))
         return self._boxes[-1]
 
+    def legs(self, avatar: str) -> Legs | None:
+        """Give an avatar legs, moved by what is added to them; None where it is drawn as somebody who has some."""
+        if self._skin is not None and not self._skin.arms_only:
+            return None
+        self._whole = True
+        self._legs.append(Legs(self._recording, f"{entity_of(avatar)}/legs"))
+        return self._legs[-1]
+
     def flush(self) -> None:
         """Send what was gathered. Does not wait for the viewer; what it has not taken yet waits in memory."""
         for person in self._people.values():
             self._send(person)
-        for box in self._boxes:
-            box.flush()
+        for prop in (*self._boxes, *self._legs):
+            prop.flush()
 
     def settled(self, timeout_s: float) -> bool:
         """Wait until the file or the viewer has taken everything that was sent, or the time is over.
@@ -136,7 +155,7 @@ class RerunView:
     def _meet(self, arms: ArmsState) -> _Person:
         """Log everything static of an avatar that is seen for the first time, and lay the viewer out anew."""
         root = entity_of(arms.avatar)
-        person = _Person(root, Sender(self._recording, root, self._skin), arms.chest)
+        person = _Person(root, Sender(self._recording, root, self._skin, self._show), arms.chest)
         offset = self._spacing_m * len(self._people)
         if offset:
             self._recording.log(root, rr.Transform3D(translation=(offset, 0.0, 0.0)), static=True)
@@ -149,7 +168,8 @@ class RerunView:
             for name, one in self._people.items():
                 log_name(self._recording, one.root, name)
         roots = {name: one.root for name, one in self._people.items()}
-        self._recording.send_blueprint(blueprint_of(roots, [one.chest for one in self._people.values()]))
+        chests = [one.chest for one in self._people.values()]
+        self._recording.send_blueprint(blueprint_of(roots, chests, whole=self._whole))
         return person
 
 
