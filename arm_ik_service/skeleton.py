@@ -8,7 +8,6 @@ import numpy as np
 
 from arm_ik_service.arm.model import ANGLES, LIMITS, ArmModel
 from arm_ik_service.body.profile import GripOffset, Profile, RangesOfMotion
-from arm_ik_service.geometry import batch
 from arm_ik_service.wire.messages import VERSION, JointLimit, Pose, Skeleton, SwingRegion
 
 EDGE_POINTS = 36  # of the swing region: every 10 degrees of azimuth, the edge being a series of four harmonics
@@ -22,12 +21,9 @@ def _limits(ranges_of_motion: RangesOfMotion) -> tuple[tuple[JointLimit, ...], S
     limits = tuple(
         JointLimit(name, *np.asarray(limits, float).tolist()) for name, limits in zip(ANGLES, ranges, strict=True)
     )
-    azimuth = np.linspace(0.0, 2.0 * np.pi, EDGE_POINTS, endpoint=False)
-    chain, away = model.chains[0], model.swing_edge(azimuth)[:, None]
-    aside = np.cos(azimuth)[:, None] * chain.swing_side + np.sin(azimuth)[:, None] * chain.swing_up
-    isb = np.concatenate([[chain.swing_centre], np.cos(away) * chain.swing_centre + np.sin(away) * aside])
-    centre, *edge = (tuple(direction) for direction in batch.rotate(chain.shoulder_from_isb, isb).tolist())
-    return limits, SwingRegion(centre, tuple(edge))
+    centre, edge = model.swing_outline(np.linspace(0.0, 2.0 * np.pi, EDGE_POINTS, endpoint=False))
+    x, y, z = centre.tolist()
+    return limits, SwingRegion((x, y, z), tuple((a, b, c) for a, b, c in edge.tolist()))
 
 
 def _pose(offset: GripOffset) -> Pose:

@@ -187,9 +187,7 @@ class Sender:
         """Move a solid that is built down -Y, `length_m` long, and make it end at `end`: lengths may be learnt."""
         scale = np.ones((len(bone), 3))
         scale[:, 1] = np.linalg.norm(end[:, :3] - bone[:, :3], axis=1) / length_m
-        self._columns(
-            entity, rr.Transform3D.columns(translation=bone[:, :3], quaternion=bone[:, 3:], scale=scale)
-        )
+        self._columns(entity, rr.Transform3D.columns(translation=bone[:, :3], quaternion=bone[:, 3:], scale=scale))
 
     def _span(self, entity: str, start: Floats, end: Floats, length_m: float) -> None:
         """Stretch a solid that is built along +Y, `length_m` long, from start to end (N,3)."""

@@ -130,7 +130,10 @@ def neck() -> Solid:
 
 def thigh() -> Solid:
     """From the hip along +Y, LEG_M long, to be stretched."""
-    return tube([(LEG_M, 0.056, 0.060, 0.0, 0.0), (0.5 * LEG_M, 0.070, 0.076, 0.0, 0.0), (0.0, 0.080, 0.086, 0.0, 0.0)], TROUSERS)
+    return tube(
+        [(LEG_M, 0.056, 0.060, 0.0, 0.0), (0.5 * LEG_M, 0.070, 0.076, 0.0, 0.0), (0.0, 0.080, 0.086, 0.0, 0.0)],
+        TROUSERS,
+    )
 
 
 def shank() -> Solid:

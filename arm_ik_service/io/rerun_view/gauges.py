@@ -10,10 +10,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from arm_ik_service.geometry import batch
 from arm_ik_service.io.rerun_view.rows import ANGLES, PLACES, Floats
 from arm_ik_service.wire.messages import Side, SwingRegion
+
+Flags = npt.NDArray[np.bool_]
 
 ARC_POINTS = 24
 DIALS = ("shoulder_twist", "elbow_flexion", "pronation", "wrist_flexion", "wrist_deviation")
@@ -26,7 +29,6 @@ RADIUS_M = {
 }
 REGION_RADIUS_M = 0.17
 SWIVEL_POINTS = 73  # of the circle: every 5 degrees
-NEARLY_STRAIGHT_M = 0.005  # radius below which the elbow's circle is a point
 
 
 @dataclass(frozen=True)
@@ -55,18 +57,20 @@ def dial(arm: Arm, name: str, lower: float, upper: float) -> tuple[Floats, Float
     sign = 1.0 if arm.side == "right" else -1.0
     zero = np.zeros_like(angle)
     if name in ("shoulder_twist", "pronation"):
-        bone, end, share = (arm.upper_arm, arm.forearm, 0.5) if name == "shoulder_twist" else (arm.forearm, arm.hand, 0.7)
+        bone, end, share = (
+            (arm.upper_arm, arm.forearm, 0.5) if name == "shoulder_twist" else (arm.forearm, arm.hand, 0.7)
+        )
         turned = sign * (angle - now)  # the bone has turned already
         local = np.stack([np.cos(turned), zero, -np.sin(turned)], axis=-1)
         centre = bone[:, :3] + share * (end[:, :3] - bone[:, :3])
     else:
-        bone, centre = (arm.upper_arm, arm.forearm[:, :3]) if name == "elbow_flexion" else (arm.forearm, arm.hand[:, :3])
+        bone, centre = (
+            (arm.upper_arm, arm.forearm[:, :3]) if name == "elbow_flexion" else (arm.forearm, arm.hand[:, :3])
+        )
         flexion, aside = angle, zero
         if name == "wrist_deviation":
             flexion, aside = arm.angles[:, [ANGLES.index("wrist_flexion")]], sign * angle
-        local = np.stack(
-            [np.sin(flexion) * np.cos(aside), -np.cos(flexion) * np.cos(aside), -np.sin(aside)], axis=-1
-        )
+        local = np.stack([np.sin(flexion) * np.cos(aside), -np.cos(flexion) * np.cos(aside), -np.sin(aside)], axis=-1)
     points = centre[:, None] + RADIUS_M[name] * batch.rotate(bone[:, None, 3:], local)
     share_of_needle = np.linspace(0.0, 1.0, ARC_POINTS)[:, None]
     return points[:, :-1], centre[:, None] + share_of_needle * (points[:, -1:] - centre[:, None])
@@ -89,11 +93,8 @@ def elbow_circle(arm: Arm, region: SwingRegion | None) -> tuple[Floats, Floats, 
     aside = np.cross(axis, out)
     swivel = np.linspace(-np.pi, np.pi, SWIVEL_POINTS)[:, None]
 
-    def at(turn: Floats) -> Floats:
-        return centre[:, None] + np.cos(turn) * out[:, None] + np.sin(turn) * aside[:, None]
-
-    circle = at(swivel)
-    free = np.ones(circle.shape[:2], bool)
+    circle = centre[:, None] + np.cos(swivel) * out[:, None] + np.sin(swivel) * aside[:, None]
+    free: Flags = np.ones(circle.shape[:2], bool)
     if region is not None:
         away = batch.rotate(batch.conjugate(arm.chest[:, None, 3:]), circle - shoulder[:, None])
         free = inside(region, batch.normalized(_of_side(arm, away)))
@@ -106,7 +107,7 @@ def elbow_circle(arm: Arm, region: SwingRegion | None) -> tuple[Floats, Floats, 
     return circle, reachable, spoke
 
 
-def inside(region: SwingRegion, directions: Floats) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
+def inside(region: SwingRegion, directions: Floats) -> Flags:
     """Whether unit directions (..., 3) of a right arm lie in the region."""
     centre, edge = np.array(region.centre), np.array(region.edge)
     aside = batch.normalized(edge[0] - (edge[0] @ centre) * centre)  # azimuth 0
@@ -117,7 +118,7 @@ def inside(region: SwingRegion, directions: Floats) -> np.ndarray[tuple[int, ...
     corners = np.linspace(0.0, 2.0 * np.pi, len(edge) + 1)
     away = np.arccos(np.clip(np.append(edge @ centre, edge[0] @ centre), -1.0, 1.0))
     allowed = np.interp(azimuth % (2.0 * np.pi), corners, away)
-    return np.asarray(np.arccos(np.clip(directions @ centre, -1.0, 1.0)) <= allowed)
+    return np.array(np.arccos(np.clip(directions @ centre, -1.0, 1.0)) <= allowed)
 
 
 def _of_side(arm: Arm, directions: object) -> Floats:

@@ -9,7 +9,7 @@ import rerun as rr
 
 from arm_ik_service.geometry import batch
 from arm_ik_service.io.rerun_view import figure
-from arm_ik_service.io.rerun_view.gauges import DIALS, Arm, dial, elbow_circle, swing_region
+from arm_ik_service.io.rerun_view.gauges import DIALS, Arm, Flags, dial, elbow_circle, swing_region
 from arm_ik_service.io.rerun_view.palette import AT_LIMIT, FAINT, GHOST, RANGE, REACH, SIDE_COLOURS
 from arm_ik_service.io.rerun_view.rows import ANGLES, PLACES, RESTS, Floats
 from arm_ik_service.io.rerun_view.solids import Colour
@@ -17,6 +17,12 @@ from arm_ik_service.wire.messages import SIDES, Side, Skeleton
 
 Overlay = Literal["reach", "swivel", "limits", "ghost"]
 OVERLAYS: tuple[Overlay, ...] = get_args(Overlay)
+LEGEND: dict[Overlay, str] = {
+    "reach": "**Ball**: what the wrist can reach.",
+    "swivel": "**Ring**: where the elbow can go, bright where the shoulder lets it.",
+    "limits": "**Rose**: ranges of the joints, needle: their angle, red: at the limit.",
+    "ghost": "**Pale hand**: the raw target's.",
+}
 HIDDEN = 1e-6  # scale of what is not there
 THIN_M, THICK_M = 0.0015, 0.0035  # radii of lines
 
@@ -89,7 +95,7 @@ class OverlaySender:
         strips = np.stack(elbow_circle(arm, self._skeleton.shoulder_swing), axis=1)
         self._columns(f"{arm.side}/swivel", _strip_columns(strips))
 
-    def _send_limits(self, arm: Arm, rests: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]) -> None:
+    def _send_limits(self, arm: Arm, rests: Flags) -> None:
         assert self._skeleton is not None
         limits = {limit.name: (limit.lower, limit.upper) for limit in self._skeleton.joint_limits}
         drawn = [name for name in DIALS if name in limits and name in ANGLES]
@@ -117,7 +123,7 @@ def _lines(colours: list[Colour], widths: tuple[int, ...]) -> rr.LineStrips3D:
     return rr.LineStrips3D.from_fields(colors=colours, radii=[THIN_M * width for width in widths])
 
 
-def _coloured(idle: Floats, active: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]) -> Floats:
+def _coloured(idle: Floats, active: Flags) -> Floats:
     """Colours (N,S,3) of lines: `idle` (S,3), or that of a limit the arm rests on."""
     return np.where(active[:, :, None], AT_LIMIT, idle).astype(np.uint8)
 
@@ -127,8 +133,8 @@ def _strip_columns(
 ) -> rr.ComponentColumnList:
     """Columns of strips (N,S,P,3), with colours (N,S,3) and radii (S,) where they are not static."""
     count, lines = strips.shape[:2]
-    # by the batch of all their points, as the SDK goes through a list of strips one by one in Python
-    fields = {"strips": list(strips.reshape(count * lines, *strips.shape[2:]).astype(np.float32))}
-    if colours is not None and radii is not None:
-        fields |= {"colors": colours.reshape(-1, 3), "radii": np.tile(radii, count)}
-    return rr.LineStrips3D.columns(**fields).partition([lines] * count)
+    return rr.LineStrips3D.columns(
+        strips=strips.reshape(count * lines, *strips.shape[2:]).astype(np.float32),
+        colors=None if colours is None else colours.reshape(-1, 3),
+        radii=None if radii is None else np.tile(radii, count),
+    ).partition([lines] * count)

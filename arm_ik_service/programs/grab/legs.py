@@ -51,7 +51,7 @@ def legs(place: Floats, heading: float, height: float, stature_m: float, phase: 
         line = batch.normalized(line)
         along = (thigh**2 - shank**2 + distance**2) / (2.0 * distance)
         out = np.cross(right, line)  # where knees bend to
-        knee = hip + along * line - math.sqrt(max(thigh**2 - along**2, 0.0)) * batch.normalized(out)
+        knee = hip + along * line + math.sqrt(max(thigh**2 - along**2, 0.0)) * batch.normalized(out)
         ankle = hip + distance * line
         turn = math.radians(pitch)
         toe = ankle + FOOT_M * (math.cos(turn) * ahead - math.sin(turn) * up) - 0.6 * ANKLE_PER_STATURE * stature_m * up

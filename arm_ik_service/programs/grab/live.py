@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from arm_ik_service.errors import SettingsError
 from arm_ik_service.io.recording import RecordingWriter
-from arm_ik_service.io.rerun_view import RerunView, Sink, Skin
+from arm_ik_service.io.rerun_view import Overlay, RerunView, Sink, Skin
 from arm_ik_service.io.zenoh_streams import Bus, answer_queries, declare_stream, put_once, subscribe
 from arm_ik_service.programs.grab.scene import CUBE_M, RATE_HZ, Moment, Scene
 from arm_ik_service.skeleton import skeleton_of
@@ -69,6 +69,7 @@ class GrabShow:
         keys: Keys | None = None,
         sinks: list[Sink] | None = None,
         skin: Skin | None = None,
+        overlays: frozenset[Overlay] = frozenset(),
         record: Path | None = None,
         say: Callable[[str], None] = lambda text: None,
     ) -> None:
@@ -81,7 +82,7 @@ class GrabShow:
         self._cube = scene.cube.copy()
         self.refused = 0
         self._skeleton = skeleton_of(self._avatar, scene.figure.profile)
-        self._view = RerunView(*sinks, name="arm-ik grab", skin=skin) if sinks else None
+        self._view = RerunView(*sinks, name="arm-ik grab", skin=skin, show=overlays) if sinks else None
         self._box = self._view.box("cube", CUBE_M) if self._view else None
         if self._view is not None:
             self._view.describe(self._skeleton)
