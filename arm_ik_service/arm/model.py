@@ -17,7 +17,7 @@ from arm_ik_service.arm.chain import CHAIN, columns_of, forward_poses
 from arm_ik_service.arm.limits import clamp_hinges, clamp_swing, clamp_twist, swing_excess, twist_excess, twist_of
 from arm_ik_service.compiled import compiled
 from arm_ik_service.errors import ModelError
-from arm_ik_service.geometry.batch import log
+from arm_ik_service.geometry.batch import log, rotate
 from arm_ik_service.geometry.scalar import scale
 from arm_ik_service.resources import resource_folder
 from arm_ik_service.wire.messages import SIDES, Side
@@ -155,6 +155,13 @@ class ArmModel:
         """Angle [rad] from the swing centre to the edge of the region at azimuths [rad]."""
         chain, k = self.chains[0], np.arange(5)[:, None]
         return np.asarray(chain.swing_cosines @ np.cos(k * azimuth) + chain.swing_sines @ np.sin(k * azimuth))
+
+    def swing_outline(self, azimuth: Array) -> tuple[Array, Array]:
+        """Swing centre (3,) and edge (N,3) at azimuths (N,) [rad]: directions in a right arm's shoulder frame."""
+        chain, away = self.chains[0], self.swing_edge(azimuth)[:, None]
+        aside = np.cos(azimuth)[:, None] * chain.swing_side + np.sin(azimuth)[:, None] * chain.swing_up
+        edge = np.cos(away) * chain.swing_centre + np.sin(away) * aside
+        return rotate(chain.shoulder_from_isb, chain.swing_centre), rotate(chain.shoulder_from_isb, edge)
 
     def random_configurations(self, count: int, rng: np.random.Generator, share: float = 1.0) -> Array:
         """Draw configurations (count, 10) uniformly from the middle `share` of every range, swing region included."""

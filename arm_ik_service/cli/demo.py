@@ -7,7 +7,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from arm_ik_service.cli.options import AvatarFile, SkinningChoice, say, skin_options, stopped_by_signals
+from arm_ik_service.cli.options import (
+    AvatarFile,
+    Show,
+    SkinningChoice,
+    say,
+    show_option,
+    skin_options,
+    stopped_by_signals,
+)
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -25,6 +33,7 @@ def demo(
     no_view: Annotated[bool, typer.Option("--no-view", help="Without a picture: the table only.")] = False,
     avatar: AvatarFile = None,
     skinning: SkinningChoice = None,
+    overlays: Show = None,
 ) -> None:
     """Play a recording through a service and watch both arms move, all of it on this machine.
 
@@ -49,6 +58,8 @@ def demo(
         skin_options(avatar, skinning)  # one that cannot be used is refused before anything starts
         view += ["--avatar", str(avatar)] if avatar is not None else []
         view += ["--skinning", skinning] if skinning is not None else []
+        show_option(overlays)
+        view += ["--show", overlays] if overlays is not None else []
     stopped = Event()
     console = Console(stderr=True)
     say(f"{path.stem}: replay -> Zenoh -> service -> Zenoh -> {'nobody' if no_view else save or 'Rerun'}")

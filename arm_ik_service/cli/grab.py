@@ -8,7 +8,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from arm_ik_service.cli.options import AvatarFile, ProfileName, SkinningChoice, say, skin_options, stopped_by_signals
+from arm_ik_service.cli.options import (
+    AvatarFile,
+    ProfileName,
+    Show,
+    SkinningChoice,
+    say,
+    show_option,
+    skin_options,
+    stopped_by_signals,
+)
 from arm_ik_service.cli.zenoh_options import opens_hub
 
 if TYPE_CHECKING:
@@ -27,7 +36,7 @@ def grab(
     save: Annotated[Path | None, typer.Option("--save", metavar="FILE", help="Write the view to this .rrd.")] = None,
     no_view: Annotated[bool, typer.Option("--no-view", help="Without a picture.")] = False,
     record: Annotated[
-        Path | None, typer.Option("--record", metavar="FILE", help="Write frames and arms, .mcap.")
+        Path | None, typer.Option("--record", metavar="FILE", help="Write frames, arms and the cube, .mcap.")
     ] = None,
     duration_s: Annotated[
         float, typer.Option("--duration", metavar="SECONDS", min=0.1, help="At most so long.")
@@ -35,6 +44,7 @@ def grab(
     fast: Annotated[bool, typer.Option("--fast", help="As fast as it goes, without Zenoh.")] = False,
     avatar: AvatarFile = None,
     skinning: SkinningChoice = None,
+    show: Show = None,
     profile: ProfileName = None,
     *,
     zenoh: BusOptions,
@@ -71,18 +81,18 @@ def grab(
     )
     if save is None and not no_view and not has_display():
         save = Path("arm-ik-grab.rrd")
+    overlays = show_option(show)
     sinks: list[Sink] = [] if no_view else [Save(save) if save is not None else Spawn()]
     with ExitStack() as stack:
         bus = None
         if not fast:
             bus = stack.enter_context(open_hub(zenoh, waiting=say))
-        show = GrabShow(
-            scene, bus=bus, sinks=sinks, skin=skin_options(avatar, skinning) if sinks else None, record=record, say=say
-        )
-        with stopped_by_signals(show.stop):
+        skin = skin_options(avatar, skinning) if sinks else None
+        performance = GrabShow(scene, bus=bus, sinks=sinks, skin=skin, overlays=overlays, record=record, say=say)
+        with stopped_by_signals(performance.stop):
             say("ready; Ctrl-C ends it")
-            last = show.run(duration_s, real_time=not fast)
-        show.close()
+            last = performance.run(duration_s, real_time=not fast)
+        performance.close()
     if last is not None:
         x, y, z = last.cube[:3]
         typer.echo(f"{last.stage}: the cube is at {x:.3f}, {y:.3f}, {z:.3f}")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 if TYPE_CHECKING:
-    from arm_ik_service.io.rerun_view import Skin
+    from arm_ik_service.io.rerun_view import Overlay, Skin
 
 ProfileName = Annotated[
     str | None,
@@ -38,6 +38,17 @@ SkinningChoice = Annotated[
         rich_help_panel="Skin",
     ),
 ]
+Show = Annotated[
+    str | None,
+    typer.Option(
+        "--show",
+        metavar="WHAT,...",
+        help="What else is drawn of each arm: [bold]reach[/bold], the ball around the shoulder that the wrist cannot "
+        "leave; [bold]swivel[/bold], the circle on which the elbow can go for this wrist, bright where the shoulder "
+        "lets it; [bold]limits[/bold], the region of the shoulder and a dial for each joint, red where the arm rests "
+        "on a limit; [bold]ghost[/bold], the hand where the raw target has it; or [bold]all[/bold].",
+    ),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object for machines instead of text.")]
 
 
@@ -52,6 +63,21 @@ def skin_options(avatar: Path | None, skinning: Literal["linear", "dual_quaterni
     for note in character.notes:
         say(f"{avatar}: {note}")
     return Skin(character, skinning or "dual_quaternion")
+
+
+def show_option(show: str | None) -> frozenset[Overlay]:
+    """Return the overlays that were asked for by name. Raises SettingsError."""
+    if show is None:
+        return frozenset()
+    from arm_ik_service.errors import SettingsError
+    from arm_ik_service.io.rerun_view import OVERLAYS
+
+    names = {name.strip() for name in show.split(",")}
+    if "all" in names:
+        return frozenset(OVERLAYS)
+    if unknown := names - set(OVERLAYS):
+        raise SettingsError(f"--show {', '.join(sorted(unknown))}: choose from {', '.join(OVERLAYS)}, or all")
+    return frozenset(overlay for overlay in OVERLAYS if overlay in names)
 
 
 @contextmanager

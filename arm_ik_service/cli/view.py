@@ -7,7 +7,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from arm_ik_service.cli.options import AvatarFile, SkinningChoice, say, skin_options, stopped_by_signals
+from arm_ik_service.cli.options import (
+    AvatarFile,
+    Show,
+    SkinningChoice,
+    say,
+    show_option,
+    skin_options,
+    stopped_by_signals,
+)
 from arm_ik_service.cli.zenoh_options import opens_client
 
 if TYPE_CHECKING:
@@ -27,6 +35,7 @@ def view(
     ] = None,
     avatar: AvatarFile = None,
     skinning: SkinningChoice = None,
+    show: Show = None,
     prefix: Annotated[str, typer.Option(help="Key prefix, as in the service's settings.")] = "",
     *,
     zenoh: BusOptions,
@@ -50,9 +59,9 @@ def view(
         sinks.append(ConnectTo(connect_rerun))
     if spawn or not sinks:
         sinks.append(Spawn())
-    skin = skin_options(avatar, skinning)
+    skin, overlays = skin_options(avatar, skinning), show_option(show)
     with open_client(zenoh, waiting=say) as bus:
-        viewer = Viewer(bus, sinks, Keys(prefix), skin)
+        viewer = Viewer(bus, sinks, Keys(prefix), skin, overlays)
         for sink in sinks:
             if isinstance(sink, Web):
                 say(f"view: open {sink.address} in a browser")

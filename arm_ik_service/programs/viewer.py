@@ -6,7 +6,7 @@ from collections.abc import Callable
 from threading import Event
 
 from arm_ik_service.errors import WireError
-from arm_ik_service.io.rerun_view import RerunView, Sink, Skin
+from arm_ik_service.io.rerun_view import Overlay, RerunView, Sink, Skin
 from arm_ik_service.io.rerun_view.live import LiveView
 from arm_ik_service.io.zenoh_streams import Bus, query, subscribe
 from arm_ik_service.wire import codec
@@ -18,11 +18,19 @@ SPACING_M = 1.2  # between people who were recorded at the same place
 class Viewer:
     """Draws every avatar on an open Zenoh session, which the caller closes."""
 
-    def __init__(self, bus: Bus, sinks: list[Sink], keys: Keys, skin: Skin | None = None) -> None:
+    def __init__(
+        self,
+        bus: Bus,
+        sinks: list[Sink],
+        keys: Keys,
+        skin: Skin | None = None,
+        overlays: frozenset[Overlay] = frozenset(),
+    ) -> None:
         """Open the sinks and subscribe; people are drawn as `skin`, or as solids. Raises ViewError."""
         self._keys = keys
         self._stopped = Event()
-        self._view = LiveView(RerunView(*sinks, name="arm-ik", spacing_m=SPACING_M, skin=skin), when_gone=self.stop)
+        view = RerunView(*sinks, name="arm-ik", spacing_m=SPACING_M, skin=skin, show=overlays)
+        self._view = LiveView(view, when_gone=self.stop)
         self.refused = 0
         self._subscribers = [
             subscribe(bus, keys.controllers(), self._guarded(self._take_frame)),

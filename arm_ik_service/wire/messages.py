@@ -142,6 +142,16 @@ class JointLimit(Struct, frozen=True):
     upper: float
 
 
+class SwingRegion(Struct, frozen=True):
+    """The directions a humerus may take, in chest axes, of the right arm; the left's have their x negated.
+
+    Star-shaped: on the great circle from `centre` to a point of `edge` every direction is inside.
+    """
+
+    centre: Vector
+    edge: tuple[Vector, ...]  # evenly spaced in azimuth around the centre
+
+
 class Skeleton(Struct, frozen=True):
     """What does not change from frame to frame, on `avatar/<id>/skeleton`: lengths [m] and limits."""
 
@@ -156,6 +166,7 @@ class Skeleton(Struct, frozen=True):
     limit_names: tuple[str, ...]  # every name that can stand in ArmState.limits
     left_wrist_from_grip: Pose = Pose((0.0, -0.02, -0.075), (0.5, -0.5, -0.5, 0.5))  # OpenXR's grip in its wrist frame
     right_wrist_from_grip: Pose = Pose((0.0, -0.02, -0.075), (0.5, 0.5, 0.5, 0.5))
+    shoulder_swing: SwingRegion | None = None  # what `shoulder_flexion` and `shoulder_abduction` together are held to
 
 
 class AvatarHealth(Struct, frozen=True):

@@ -202,6 +202,50 @@ def test_a_person_nobody_described_is_measured(tmp_path: Path) -> None:
         np.testing.assert_allclose(measured.static[key], described.static[key], atol=1e-6)
 
 
+def test_bones_whose_length_is_learnt_reach_from_joint_to_joint_all_the_same(tmp_path: Path) -> None:
+    longer = msgspec.structs.replace(SKELETON, upper_arm_m=0.25, forearm_m=0.325)
+    log = recorded(tmp_path, [answer(0), answer(1)], longer)
+    for bone, described, grown in (("upper_arm", 0.25, 0.30), ("forearm", 0.325, 0.26)):
+        scale = log.of(f"/avatar/ann/left/{bone}", "Transform3D:scale")[:, 0]
+        np.testing.assert_allclose(scale, [(1.0, grown / described, 1.0)] * 2, rtol=1e-5)
+
+
+def eyes_of(path: Path) -> list[dict[str, Any]]:
+    """The eyes of all blueprints, which the reader gives in no order: one for each person who came."""
+    eyes = []
+    for store in RrdReader(path).blueprints():
+        eye: dict[str, Any] = {}
+        for chunk in RrdReader(path).stream(store=store):
+            batch = chunk.to_record_batch()
+            for k, field in enumerate(batch.schema):
+                if "EyeControls3D:" in field.name:
+                    eye[field.name.rsplit(":", 1)[-1]] = batch.column(k).to_pylist()[0]
+        eyes.append(eye)
+    return eyes
+
+
+def test_the_eye_goes_along_with_one_person_and_stays_where_it_sees_all_of_many(tmp_path: Path) -> None:
+    alone, group = tmp_path / "alone.rrd", tmp_path / "group.rrd"
+    for path, names in ((alone, ["ann"]), (group, ["ann", "bob", "cleo", "dan", "eve", "fay", "gus"])):
+        with RerunView(Save(path), spacing_m=1.2) as view:
+            for name in names:
+                frame, arms = answer(0, avatar=name)
+                view.add(arms, frame)
+    assert [eye["tracking_entity"] for eye in eyes_of(alone)] == [["avatar/ann/chest"]]
+    eyes = eyes_of(group)
+    assert sum(bool(eye.get("tracking_entity")) for eye in eyes) == 1, "until the second person came"
+    last = max(eyes, key=lambda eye: sum(eye["look_target"][0]))  # the group grows towards +x and +z
+    assert not last.get("tracking_entity")
+    places = [
+        Recorded(group).static.get((f"/avatar/{name}", "Transform3D:translation"), [[0.0, 0.0, 0.0]])[0]
+        for name in ("ann", "bob", "cleo", "dan", "eve", "fay", "gus")
+    ]
+    apart = [np.linalg.norm(np.subtract(a, b)) for k, a in enumerate(places) for b in places[:k]]
+    assert min(apart) > 1.19
+    target = np.array(last["look_target"][0])
+    np.testing.assert_allclose(target[[0, 2]], [0.5 * np.ptp(np.array(places)[:, k]) for k in (0, 2)], atol=1e-5)
+
+
 def test_a_live_view_pairs_answers_with_frames_that_come_before_or_after(tmp_path: Path) -> None:
     path = tmp_path / "live.rrd"
     with LiveView(RerunView(Save(path)), period_s=3600.0) as live:

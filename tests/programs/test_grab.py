@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import itertools
+import json
 from functools import cache
+from pathlib import Path
 
 import msgspec
 import numpy as np
 import numpy.typing as npt
 import pytest
 from harness import wait_for
+from mcap.reader import make_reader
 
 from arm_ik_service.errors import SettingsError
 from arm_ik_service.ik.registry import SOLVERS, SolverChoice
+from arm_ik_service.io.session import open_session
 from arm_ik_service.io.zenoh_bus import BusOptions, open_client, open_hub
 from arm_ik_service.io.zenoh_streams import query, subscribe
 from arm_ik_service.programs.demo import free_endpoint
 from arm_ik_service.programs.grab.helpers import MOST, PRIORITY, recruit
+from arm_ik_service.programs.grab.legs import legs
 from arm_ik_service.programs.grab.live import CUBE_KEY, GrabShow, cube_pose
 from arm_ik_service.programs.grab.scene import RATE_HZ, Moment, Scene
 from arm_ik_service.programs.grab.walk import CYCLE_M, SPEED_M_S, Walker, cycle
@@ -79,6 +84,53 @@ def test_a_low_goal_asks_the_trunk_for_help_and_lets_go_of_it_again() -> None:
     assert most["clavicle"] > 0.9 * MOST[0]
     assert most["lean"] > 0.2
     assert max(performance()[-1].help_given.values()) < 0.02
+
+
+def test_a_foot_that_stands_stays_where_it_is_and_none_goes_through_the_floor() -> None:
+    """At full stride; the leg is a little short for the foot where it is set down."""
+    walk = [
+        legs(np.array([0.0, -phase * CYCLE_M]), 0.0, float(cycle(phase)[2]), 1.75, phase, 1.0)
+        for phase in np.linspace(0.0, 1.0, 201)
+    ]
+    ankles = np.array(walk)[:, :, 2]
+    standing = ankles[20:60, 1]  # of the right foot, from 0.1 to 0.3 of the cycle
+    assert np.ptp(standing, axis=0).max() < 0.03
+    swinging = ankles[110:190, 1]
+    assert -np.ptp(swinging[:, 2]) < -0.8, "it overtakes the body"
+    assert ankles[..., 1].min() > 0.03
+    np.testing.assert_allclose(ankles[100, 0] - ankles[0, 1], [-0.18, 0.0, -0.5 * CYCLE_M], atol=1e-6)
+
+
+def test_legs_hang_together_and_knees_bend_forwards() -> None:
+    for m in performance()[::10]:
+        hips, knees, ankles, toes = np.moveaxis(m.legs, 1, 0)
+        np.testing.assert_allclose(np.linalg.norm(knees - hips, axis=1), 0.245 * 1.75, atol=1e-6)
+        np.testing.assert_allclose(np.linalg.norm(ankles - knees, axis=1), 0.246 * 1.75, atol=1e-6)
+        ahead = (toes - ankles) * [1.0, 0.0, 1.0]
+        assert (np.sum((knees - 0.5 * (hips + ankles)) * ahead, axis=1) > 0.0).all()
+        assert (m.legs[..., 1] > -0.02).all()
+
+
+def test_the_recording_holds_the_cube_and_is_a_session_like_any_other(tmp_path: Path) -> None:
+    path = tmp_path / "grab.mcap"
+    show = GrabShow(Scene(CUBE, GOAL), record=path)
+    show.run(4.0, real_time=False)
+    show.close()
+    with path.open("rb") as file:
+        messages = [
+            (schema.name, message.log_time, json.loads(message.data))
+            for schema, _, message in make_reader(file).iter_messages(topics=[CUBE_KEY])
+            if schema is not None
+        ]
+    assert {name for name, _, _ in messages} == {"arm_ik.Pose"}
+    told = [pose["position"] for _, _, pose in messages]
+    np.testing.assert_allclose(told, [m.cube[:3] for m in performance()[: len(told)]], atol=1e-12)
+    assert np.ptp(told, axis=0).max() > 0.3, "it was carried"
+    session = open_session(path)
+    assert session.avatars == ("grab",)
+    frames = list(session.frames())
+    assert [time for _, time, _ in messages] == [one.receive_time_ns for one in frames]
+    assert not session.warnings
 
 
 def test_it_is_the_same_every_time() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 from arm_poses import MEASURES
@@ -39,6 +40,17 @@ def read(path: Path) -> dict[tuple[str, str], list[Any]]:
 def farthest(points: Floats, places: Floats) -> float:
     """Largest distance [m] of a place from the nearest of the points."""
     return float(max(np.linalg.norm(points - place, axis=1).min() for place in places))
+
+
+def test_a_skin_grows_with_arms_whose_length_is_learnt(tmp_path: Path) -> None:
+    path = tmp_path / "arms.rrd"
+    short = msgspec.structs.replace(SKELETON, upper_arm_m=0.25, forearm_m=0.22)
+    write_recording(path, [answer(0)], short, skin=Skin(load_built_in_arms()))
+    seen = np.array(read(path)[f"{ROOT}/skin/bending", "Mesh3D:vertex_positions"][0])
+    lengths = ArmMeasures(SKELETON.stature_m, SKELETON.upper_arm_m, SKELETON.forearm_m, SKELETON.shoulder_width_m)
+    puppet = Puppet(load_built_in_arms(), lengths)
+    whole = puppet.skin(puppet.motions(poses_of(answer(0)[1]))[0])[0]
+    assert farthest(whole, seen[::100]) < 1e-6
 
 
 def test_arms_alone_take_the_place_of_the_solid_arms_and_bend_with_the_bones(tmp_path: Path) -> None:

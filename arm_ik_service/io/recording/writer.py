@@ -16,7 +16,7 @@ from arm_ik_service.errors import DecodeError, SessionError
 from arm_ik_service.io.samples import finite_frame
 from arm_ik_service.wire.codec import encode, json_schema
 from arm_ik_service.wire.keys import Keys
-from arm_ik_service.wire.messages import ArmsState, ControllerFrame, Skeleton
+from arm_ik_service.wire.messages import ArmsState, ControllerFrame, Pose, Skeleton
 
 PROFILE = "arm_ik"  # of the MCAP header, and the name of our metadata record
 FLUSH_EVERY_NS = 1_000_000_000  # what a kill costs at most; a second of two avatars still compresses well
@@ -68,6 +68,10 @@ class RecordingWriter:
     def write_calibration(self, avatar: str, payload: bytes, log_time_ns: int) -> None:
         """Add a calibration profile as it came over the bus, in either encoding."""
         self._add(self._channel(self._keys.calibration(avatar), None), _as_json(payload), log_time_ns, log_time_ns)
+
+    def write_pose(self, key: str, pose: Pose, log_time_ns: int) -> None:
+        """Add where a thing of the scene is, under the key that moves it."""
+        self._add(self._channel(key, Pose), encode(pose, "json"), log_time_ns, log_time_ns)
 
     def flush(self) -> None:
         """Hand everything written so far to the operating system: from here on a kill cannot lose it."""

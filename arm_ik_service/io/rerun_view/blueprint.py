@@ -18,20 +18,30 @@ LEGEND_HEIGHT = 0.075
 Views = list["rrb.View | rrb.Container"]
 
 
-def eye_in_front_of(chests: Sequence[Pose]) -> archetypes.EyeControls3D:
-    """Look at all of these people from the front of the first, a little from above and from their left."""
+def eye_in_front_of(
+    chests: Sequence[Pose], follow: str | None = None, *, whole: bool = False
+) -> archetypes.EyeControls3D:
+    """Look at all of these people from where they face, a little from above and from their left.
+
+    At the `whole` of them, or at what is above the hips. The eye goes along with the entity `follow`.
+    """
     positions = [chest.position for chest in chests]
-    middle = tuple(sum(p[k] for p in positions) / len(positions) for k in range(3))
+    middle = tuple(0.5 * (min(p[k] for p in positions) + max(p[k] for p in positions)) for k in range(3))
     spread = max(abs(p[k] - middle[k]) for p in positions for k in (0, 2))
-    forward = batch.rotate(chests[0].orientation, (0.0, 0.0, -1.0))
+    forward = batch.rotate([chest.orientation for chest in chests], (0.0, 0.0, -1.0)).mean(axis=0)
     forward[1] = 0.0
     forward = batch.normalized(forward if float(forward @ forward) > 1e-6 else (0.0, 0.0, -1.0))
     left = (forward[2], 0.0, -forward[0])
-    distance = 1.40 + 1.6 * spread
-    position = [middle[k] + distance * forward[k] + 0.22 * distance * left[k] for k in range(3)]
-    position[1] = middle[1] + 0.28 * distance
+    distance = (2.1 if whole else 1.40) + 1.25 * spread
+    aside, above = (0.22, 0.28) if len(chests) == 1 else (0.08, 0.4)  # a group is seen best over its heads
+    position = [middle[k] + distance * forward[k] + aside * distance * left[k] for k in range(3)]
+    position[1] = middle[1] + above * distance
     return archetypes.EyeControls3D(
-        kind=rrb.Eye3DKind.Orbital, position=position, look_target=_raised(middle, -0.14), eye_up=(0.0, 1.0, 0.0)
+        kind=rrb.Eye3DKind.Orbital,
+        position=position,
+        look_target=_raised(middle, -0.5 if whole else -0.14),
+        eye_up=(0.0, 1.0, 0.0),
+        tracking_entity=follow,
     )
 
 
@@ -78,17 +88,43 @@ def _plots(root: str, name: str) -> rrb.Container:
     )
 
 
-def blueprint_of(roots: dict[str, str], chests: Sequence[Pose]) -> rrb.Blueprint:
+def _everybody(roots: Sequence[str]) -> rrb.Container:
+    """Who is lost, who is late, whose hands are off: all avatars in one plot each."""
+
+    def plot(what: str, name: str) -> rrb.TimeSeriesView:
+        return rrb.TimeSeriesView(
+            contents=[f"/{root}/plots/{what}" for root in roots],
+            name=name,
+            time_ranges=_window(),
+            plot_legend=rrb.PlotLegend(visible=False),
+        )
+
+    tracking = rrb.StateTimelineView(
+        contents=[f"/{root}/plots/tracking/**" for root in roots], name="tracking", time_ranges=_window()
+    )
+    return rrb.Vertical(
+        tracking,
+        plot("residual_mm", "hand residuals [mm]"),
+        plot("latency_ms", "latencies [ms]"),
+        row_shares=[2.4, 1.0, 1.0],
+        name="everybody",
+    )
+
+
+def blueprint_of(
+    roots: dict[str, str], chests: Sequence[Pose], followed: str | None = None, *, whole: bool = False
+) -> rrb.Blueprint:
     """Lay out the avatars `roots`: id -> entity; `chests` are where they are now, for the eye.
 
-    One avatar has its plots beside it; of many, all stand in one picture and each has a tab of plots.
+    One avatar has its plots beside it, and the eye goes along with the entity `followed`. Many stand in one wide
+    picture; beside it is a tab for what concerns everybody, and one for each.
     """
     people = rrb.Vertical(
         rrb.Spatial3DView(
             origin="/",
             contents="/**",
             name="arms",
-            eye_controls=eye_in_front_of(chests),
+            eye_controls=eye_in_front_of(chests, followed, whole=whole),
             background=archetypes.Background(color=(24, 27, 33)),
             line_grid=archetypes.LineGrid3D(visible=True, spacing=0.5, stroke_width=0.5, color=(150, 160, 180, 60)),
         ),
@@ -96,9 +132,13 @@ def blueprint_of(roots: dict[str, str], chests: Sequence[Pose]) -> rrb.Blueprint
         row_shares=[1.0 - LEGEND_HEIGHT, LEGEND_HEIGHT],
     )
     plots = [_plots(root, name) for name, root in roots.items()]
-    beside = plots[0] if len(plots) == 1 else rrb.Tabs(*plots)
+    one = len(plots) == 1
     return rrb.Blueprint(
-        rrb.Horizontal(people, beside, column_shares=[1.25, 1.0]),
+        rrb.Horizontal(
+            people,
+            plots[0] if one else rrb.Tabs(_everybody(list(roots.values())), *plots),
+            column_shares=[1.25 if one else 2.0, 1.0],
+        ),
         rrb.TimePanel(state="collapsed", timeline="sample_time"),
         rrb.BlueprintPanel(state="hidden"),
         rrb.SelectionPanel(state="hidden"),

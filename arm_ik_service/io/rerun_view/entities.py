@@ -10,6 +10,7 @@ import rerun as rr
 
 from arm_ik_service.geometry import batch
 from arm_ik_service.io.rerun_view import figure
+from arm_ik_service.io.rerun_view.overlays import HIDDEN, Overlay, OverlaySender
 from arm_ik_service.io.rerun_view.palette import LATENCY_COLOURS, LIMIT, NAME, RESIDUAL, SIDE_COLOURS, STATE_COLOURS
 from arm_ik_service.io.rerun_view.rows import ANGLES, LATENCIES, PLACES, STATES, Floats, Rows
 from arm_ik_service.io.rerun_view.skinned import Skin, SkinSender
@@ -23,7 +24,6 @@ SKULL_BASE = (0.0, -0.075, 0.082)  # in the head frame [m]
 ABOVE_HEAD = (0.0, 0.24, 0.085)  # in the head frame [m]
 LINE_RADIUS_M = 0.0035
 FOREARM_PER_STATURE, HAND_PER_FOREARM = 0.146, 0.108 / 0.146  # Drillis & Contini 1966
-HIDDEN = 1e-6  # scale of what is not there
 
 
 def entity_of(avatar: str) -> str:
@@ -31,7 +31,8 @@ def entity_of(avatar: str) -> str:
     return rr.new_entity_path(["avatar", avatar]).lstrip("/")
 
 
-def _mesh(solid: Solid) -> rr.Mesh3D:
+def mesh_of(solid: Solid) -> rr.Mesh3D:
+    """Return a solid as Rerun's archetype."""
     return rr.Mesh3D(
         vertex_positions=solid.vertices.astype(np.float32),
         vertex_normals=solid.normals.astype(np.float32),
@@ -126,12 +127,20 @@ def between_y(direction: Floats) -> Floats:
 class Sender:
     """Sends the gathered rows of one avatar as columns."""
 
-    def __init__(self, recording: rr.RecordingStream, root: str, skin: Skin | None = None) -> None:
+    def __init__(
+        self,
+        recording: rr.RecordingStream,
+        root: str,
+        skin: Skin | None = None,
+        show: frozenset[Overlay] = frozenset(),
+    ) -> None:
+        self._overlays = OverlaySender(recording, root, show)
         self._skin = SkinSender(recording, root, skin) if skin is not None else None
         self._replaced = skin.replaces if skin is not None else set()
         self._tints_hands = skin is None or skin.arms_only
         self._limits_deg: Floats = np.full((len(ANGLES), 2), np.nan)
         self._wrist_from_grip: dict[Side, Floats] = {}
+        self._lengths_m: dict[str, float] = {}
         self._recording = recording
         self._root = root
         self._states: dict[Side, TrackingState | None] = dict.fromkeys(SIDES)
@@ -141,9 +150,11 @@ class Sender:
         """Log the solids, static; from now on the plots have these limits, the residual line starts at these grips."""
         for name, solid in _solids(skeleton).items():
             if name not in self._replaced:
-                self._recording.log(f"{self._root}/{name}", _mesh(solid), static=True)
+                self._recording.log(f"{self._root}/{name}", mesh_of(solid), static=True)
         if self._skin is not None:
             self._skin.describe(skeleton)
+        self._overlays.describe(skeleton)
+        self._lengths_m = {"upper_arm": skeleton.upper_arm_m, "forearm": skeleton.forearm_m}
         limits = {limit.name: (limit.lower, limit.upper) for limit in skeleton.joint_limits}
         self._limits_deg = np.rad2deg([limits.get(name, (np.nan, np.nan)) for name in ANGLES])
         self._wrist_from_grip = {
@@ -163,6 +174,7 @@ class Sender:
         for k, side in enumerate(SIDES):
             self._send_side(side, values)
             self._send_state(side, [pair[k] for pair in rows.states], frames, times)
+        self._overlays.send(values, self._time, self._wrist_from_grip)
         self._send_plots(values)
 
     def _columns(self, entity: str, columns: Iterable[rr.ComponentColumn]) -> None:
@@ -170,6 +182,12 @@ class Sender:
 
     def _move(self, entity: str, pose: Floats) -> None:
         self._columns(entity, rr.Transform3D.columns(translation=pose[:, :3], quaternion=pose[:, 3:]))
+
+    def _stretch(self, entity: str, bone: Floats, end: Floats, length_m: float) -> None:
+        """Move a solid that is built down -Y, `length_m` long, and make it end at `end`: lengths may be learnt."""
+        scale = np.ones((len(bone), 3))
+        scale[:, 1] = np.linalg.norm(end[:, :3] - bone[:, :3], axis=1) / length_m
+        self._columns(entity, rr.Transform3D.columns(translation=bone[:, :3], quaternion=bone[:, 3:], scale=scale))
 
     def _span(self, entity: str, start: Floats, end: Floats, length_m: float) -> None:
         """Stretch a solid that is built along +Y, `length_m` long, from start to end (N,3)."""
@@ -194,8 +212,9 @@ class Sender:
         x, y, z = GIRDLE_ROOT
         root = chest[:, :3] + batch.rotate(chest[:, 3:], (-x if side == "left" else x, y, z))
         self._span(f"{side}/shoulder", root, upper_arm[:, :3], figure.GIRDLE_M)
-        for name, pose in (("upper_arm", upper_arm), ("forearm", forearm), ("hand", hand)):
-            self._move(f"{side}/{name}", pose)
+        for name, bone, end in (("upper_arm", upper_arm, forearm), ("forearm", forearm, hand)):
+            self._stretch(f"{side}/{name}", bone, end, self._lengths_m[name])
+        self._move(f"{side}/hand", hand)
 
         there = np.isfinite(target).all(axis=1, keepdims=True)
         shown = np.where(there, target, hand)

@@ -12,6 +12,7 @@ from arm_ik_service.io.rerun_view.solids import Colour, Solid, capsule, join, ri
 from arm_ik_service.wire.messages import Side
 
 SKIN: Colour = (226, 186, 160)
+TROUSERS: Colour = (92, 100, 116)
 SHIRT: Colour = (203, 209, 218)
 HEADSET: Colour = (44, 48, 56)
 VISOR: Colour = (86, 100, 120)
@@ -21,6 +22,7 @@ CONTROLLER: Colour = (250, 250, 252)
 HAND_M = 0.189  # the hand below is of this length, wrist to fingertip if it were straight
 NECK_M = 0.12  # the neck below
 GIRDLE_M = 0.15  # half the girdle below
+LEG_M, FOOT_M = 0.43, 0.17  # thigh, shank and foot below
 
 
 def upper_arm(side: Side, length_m: float) -> Solid:
@@ -124,6 +126,32 @@ def torso(shoulder_width_m: float) -> Solid:
 def neck() -> Solid:
     """A neck that stands on the origin, NECK_M tall, to be stretched along Y."""
     return tube([(NECK_M, 0.050, 0.054, 0.0, 0.0), (0.0, 0.056, 0.058, 0.0, 0.0), (-0.02, 0.06, 0.06, 0.0, 0.0)], SKIN)
+
+
+def thigh() -> Solid:
+    """From the hip along +Y, LEG_M long, to be stretched."""
+    return tube(
+        [(LEG_M, 0.056, 0.060, 0.0, 0.0), (0.5 * LEG_M, 0.070, 0.076, 0.0, 0.0), (0.0, 0.080, 0.086, 0.0, 0.0)],
+        TROUSERS,
+    )
+
+
+def shank() -> Solid:
+    """From the knee along +Y, LEG_M long, to be stretched."""
+    return tube(
+        [
+            (LEG_M, 0.038, 0.040, 0.0, 0.0),
+            (0.4 * LEG_M, 0.050, 0.056, 0.0, 0.0),
+            (0.0, 0.056, 0.060, 0.0, 0.0),
+            (-0.03, 0.040, 0.044, 0.0, 0.0),
+        ],
+        TROUSERS,
+    )
+
+
+def foot() -> Solid:
+    """A shoe from the ankle along +Y, FOOT_M long."""
+    return capsule((0.0, -0.02, 0.0), (0.0, FOOT_M, 0.0), (0.046, 0.036), HEADSET)
 
 
 def head() -> Solid:

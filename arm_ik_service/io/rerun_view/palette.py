@@ -13,6 +13,11 @@ STATE_COLOURS: dict[TrackingState, Colour] = {
     "lost": (120, 126, 138),
 }
 LIMIT: Colour = (150, 70, 76)
+AT_LIMIT: Colour = (255, 70, 70)
+RANGE: Colour = (176, 128, 132)
+FAINT: Colour = (96, 104, 118)
+REACH = 22  # opacity of a reach sphere
+GHOST = (235, 238, 255, 90)
 NAME: Colour = (235, 238, 242)
 RESIDUAL: Colour = (255, 60, 90)
 LATENCY_COLOURS: tuple[Colour, Colour, Colour] = ((120, 170, 220), (170, 130, 220), (220, 220, 225))

@@ -17,7 +17,8 @@ from arm_ik_service.io.rerun_view.sinks import free_port, viewer_binary
 
 RRD_MAGIC = b"RRF"
 START_WITHIN_S = 60.0  # software rendering on a busy machine takes its time
-SETTLED_AFTER_S = 1.0  # from the change of time to a picture in which every plot has followed
+LOOK_EVERY_S = 0.7  # longer than a plot rests between two steps of its glide
+SETTLES_WITHIN_S = 20.0  # a picture that never rests is one of something that moves by itself
 
 
 def write_picture(
@@ -39,8 +40,7 @@ def write_picture(
         last = _last_frame(viewer)
         _hide_bars(viewer)
         viewer.set_time("frame", sequence=last if frame is None else frame, play_state="paused")
-        time.sleep(SETTLED_AFTER_S)
-        viewer.save_screenshot(str(picture.resolve()))
+        _save_at_rest(viewer, picture)
     if not picture.is_file():
         raise ViewError(f"the viewer wrote no picture to {picture}: may it write there?")
 
@@ -92,6 +92,18 @@ def _hide_bars(viewer: ViewerClient) -> None:
     blueprint["/top_panel"] = {"PanelBlueprint": {"state": "Hidden"}}
     blueprint["/time_panel"]["TimePanelBlueprint"]["state"] = "Hidden"
     viewer.set_blueprint(blueprint, "recording")
+
+
+def _save_at_rest(viewer: ViewerClient, picture: Path) -> None:
+    """Save what is shown once it no longer changes: plots glide to their new ranges, slowly on a busy machine."""
+    before, give_up = b"", time.monotonic() + SETTLES_WITHIN_S
+    while time.monotonic() < give_up:
+        time.sleep(LOOK_EVERY_S)
+        viewer.save_screenshot(str(picture.resolve()))
+        now = picture.read_bytes() if picture.is_file() else b""
+        if now == before:
+            return
+        before = now
 
 
 def _last_frame(viewer: ViewerClient) -> int:

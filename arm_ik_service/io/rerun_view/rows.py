@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import get_args
 
 import numpy as np
@@ -30,6 +31,7 @@ Floats = npt.NDArray[np.float64]
 ANGLES: tuple[str, ...] = JointAngles.__struct_fields__
 STATES: tuple[TrackingState, ...] = get_args(TrackingState)
 BONES = ("upper_arm", "forearm", "hand")
+RESTS = ("shoulder_swing", *ANGLES[2:])  # names in ArmState.limits of the limits an arm rests on
 LATENCIES = ("network", "solve", "total")
 
 _VALID = ORIENTATION_VALID | POSITION_VALID
@@ -42,6 +44,7 @@ def _layout() -> tuple[dict[str, slice], int]:
     for side in SIDES:
         sizes += [(f"{side}/{bone}", 7) for bone in BONES]
         sizes += [(f"{side}/target", 7), (f"{side}/angles", 9), (f"{side}/rates", 9), (f"{side}/residual_mm", 1)]
+        sizes += [(f"{side}/rests", len(RESTS))]
     places, start = {}, 0
     for name, size in sizes:
         places[name] = slice(start, start + size)
@@ -76,6 +79,11 @@ def _angles(angles: JointAngles) -> tuple[float, ...]:
     )
 
 
+@lru_cache(maxsize=1024)  # few combinations occur
+def _rests(limits: tuple[str, ...]) -> tuple[float, ...]:
+    return tuple(float(name in limits) for name in RESTS)
+
+
 def _arm(arm: ArmState, target: TrackedPose | None) -> tuple[float, ...]:
     bones = arm.bones
     return (
@@ -86,6 +94,7 @@ def _arm(arm: ArmState, target: TrackedPose | None) -> tuple[float, ...]:
         *_angles(arm.angles),
         *_angles(arm.angle_rates),
         1e3 * arm.position_error_m,
+        *_rests(arm.limits),
     )
 
 

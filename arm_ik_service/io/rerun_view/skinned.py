@@ -25,6 +25,7 @@ from arm_ik_service.skin.twist import along
 from arm_ik_service.wire.messages import SIDES, Skeleton
 
 PIECE = 64  # frames skinned and sent together: 6 MB
+FITS_WITHIN = 0.015  # of the arm's length, 8 mm: nobody sees that at a wrist
 SLEEVE_ENDS = 0.88  # of the forearm, where arms alone wear sleeves
 WHITE = (255, 255, 255)  # a hand to be tinted by its tracking state
 
@@ -58,11 +59,15 @@ class SkinSender:
         self._root = root
         self._skin = skin
         self._puppet: Puppet | None = None
+        self._measures: ArmMeasures | None = None
         self._rigid: list[int] = []
 
     def describe(self, skeleton: Skeleton) -> None:
         """Fit the character to a person and log its rigid parts and the triangles of the rest, static."""
-        measures = ArmMeasures(skeleton.stature_m, skeleton.upper_arm_m, skeleton.forearm_m, skeleton.shoulder_width_m)
+        self._fit(ArmMeasures(skeleton.stature_m, skeleton.upper_arm_m, skeleton.forearm_m, skeleton.shoulder_width_m))
+
+    def _fit(self, measures: ArmMeasures) -> None:
+        self._measures = measures
         puppet = Puppet(self._skin.character, measures, self._skin.skinning)
         if self._skin.arms_only:
             puppet.mesh = replace(puppet.mesh, colours=_sleeves(puppet.mesh))
@@ -84,6 +89,7 @@ class SkinSender:
             self._send(values[piece], time_columns(frames[piece], times_ns[piece]))
 
     def _send(self, values: Floats, time: list[rr.TimeColumn]) -> None:
+        self._follow_lengths(values[-1])
         assert self._puppet is not None
         rows = len(values)
         names = ["chest", "head", *(f"{side}/{bone}" for side in SIDES for bone in BONES)]
@@ -108,6 +114,17 @@ class SkinSender:
                 vertex_positions=vertices.reshape(-1, 3), vertex_normals=normals.reshape(-1, 3)
             ).partition([count] * rows),
         )
+
+    def _follow_lengths(self, row: Floats) -> None:
+        """Fit the character again where the arms have grown since: those of people without a profile are learnt."""
+        assert self._measures is not None
+        joints = [[row[PLACES[f"{side}/{bone}"]][:3] for side in SIDES] for bone in BONES]
+        shoulders, elbows, wrists = np.array(joints)
+        upper_arm, forearm = np.linalg.norm(shoulders - elbows, axis=1), np.linalg.norm(elbows - wrists, axis=1)
+        now = replace(self._measures, upper_arm=float(upper_arm.mean()), forearm=float(forearm.mean()))
+        grown = (now.upper_arm + now.forearm) / (self._measures.upper_arm + self._measures.forearm)
+        if abs(grown - 1.0) > FITS_WITHIN:
+            self._fit(now)
 
     def _tinted_hand(self, bone: int) -> str | None:
         """Entity of the solid hand that this part stands in for, if it does."""

@@ -15,7 +15,9 @@ import rerun as rr
 from arm_ik_service.errors import ViewError
 from arm_ik_service.io.rerun_view.blueprint import blueprint_of
 from arm_ik_service.io.rerun_view.entities import Sender, entity_of, log_name, log_styles, skeleton_of
-from arm_ik_service.io.rerun_view.props import Box
+from arm_ik_service.io.rerun_view.overlays import LEGEND as OVERLAY_LEGEND
+from arm_ik_service.io.rerun_view.overlays import Overlay
+from arm_ik_service.io.rerun_view.props import Box, Legs
 from arm_ik_service.io.rerun_view.rows import Rows
 from arm_ik_service.io.rerun_view.sinks import Save, Sink, attach, first_line
 from arm_ik_service.io.rerun_view.skinned import Skin
@@ -24,11 +26,11 @@ from arm_ik_service.wire.messages import ArmsState, ControllerFrame, Pose, Skele
 APPLICATION = "arm_ik"
 CLOSE_WITHIN_S = 5.0
 BATCH_ROWS = 512  # offline: rows gathered before they are sent; a call then costs nothing a row
+ROW = 5  # people beside each other
 LEGEND = """\
 **Sleeves, plots**: left blue, right orange. **Dark red**: joint limits. **White controller**: the pose asked for; \
 **red line**: from the hand to it. **Hands**: tracked green, inferred yellow, held pink, lost grey. \
-**Latency**: network blue, solve violet, total white.
-"""
+**Latency**: network blue, solve violet, total white."""
 
 
 @dataclass
@@ -49,10 +51,17 @@ class RerunView:
     Timelines: `frame` (seq) and `sample_time` (duration). Nothing is sent before `flush`, `close`, or BATCH_ROWS rows.
     """
 
-    def __init__(self, *sinks: Sink, name: str = "", spacing_m: float = 0.0, skin: Skin | None = None) -> None:
+    def __init__(
+        self,
+        *sinks: Sink,
+        name: str = "",
+        spacing_m: float = 0.0,
+        skin: Skin | None = None,
+        show: frozenset[Overlay] = frozenset(),
+    ) -> None:
         """Open the sinks; `name` titles the recording, `spacing_m` sets avatars apart that share one origin.
 
-        With a `skin` everybody is drawn as that character; without, as solids.
+        With a `skin` everybody is drawn as that character; without, as solids. `show` adds what explains the arms.
 
         Raises ViewError.
         """
@@ -61,13 +70,17 @@ class RerunView:
         self.watched = not all(isinstance(sink, Save) for sink in sinks)  # somebody looks on
         self._spacing_m = spacing_m
         self._skin = skin
+        self._show = show
         self._people: dict[str, _Person] = {}
         self._boxes: list[Box] = []
+        self._legs: list[Legs] = []
+        self._whole = skin is not None and not skin.arms_only  # people are seen down to their feet
         self._described: dict[str, Skeleton] = {}
         if name:
             self._recording.send_recording_name(name)
+        legend = " ".join([LEGEND, *(text for overlay, text in OVERLAY_LEGEND.items() if overlay in show)])
         self._recording.log("/", rr.ViewCoordinates.RIGHT_HAND_Y_UP, static=True)
-        self._recording.log("/legend", rr.TextDocument(LEGEND, media_type=rr.MediaType.MARKDOWN), static=True)
+        self._recording.log("/legend", rr.TextDocument(legend, media_type=rr.MediaType.MARKDOWN), static=True)
 
     def describe(self, skeleton: Skeleton) -> None:
         """Take in what does not change of an avatar: lengths, joint limits, grips. Again where that did change.
@@ -91,12 +104,22 @@ class RerunView:
         self._boxes.append(Box(self._recording, name, edge_m))
         return self._boxes[-1]
 
+    def legs(self, avatar: str) -> Legs | None:
+        """Give an avatar legs, moved by what is added to them; None where it is drawn as somebody who has some."""
+        if self._skin is not None and not self._skin.arms_only:
+            return None
+        self._whole = True
+        self._legs.append(Legs(self._recording, f"{entity_of(avatar)}/legs"))
+        return self._legs[-1]
+
     def flush(self) -> None:
         """Send what was gathered. Does not wait for the viewer; what it has not taken yet waits in memory."""
         for person in self._people.values():
             self._send(person)
         for box in self._boxes:
             box.flush()
+        for legs in self._legs:
+            legs.flush()
 
     def settled(self, timeout_s: float) -> bool:
         """Wait until the file or the viewer has taken everything that was sent, or the time is over.
@@ -133,15 +156,21 @@ class RerunView:
         rows, person.rows = person.rows, Rows()
         person.sender.send(rows)
 
+    def _followed(self, root: str) -> str | None:
+        """Entity that the eye goes along with: the only person's middle."""
+        if len(self._people) > 1:
+            return None
+        return f"{root}/legs/right/thigh" if self._legs else f"{root}/chest"
+
     def _meet(self, arms: ArmsState) -> _Person:
         """Log everything static of an avatar that is seen for the first time, and lay the viewer out anew."""
         root = entity_of(arms.avatar)
-        person = _Person(root, Sender(self._recording, root, self._skin), arms.chest)
-        offset = self._spacing_m * len(self._people)
-        if offset:
-            self._recording.log(root, rr.Transform3D(translation=(offset, 0.0, 0.0)), static=True)
+        person = _Person(root, Sender(self._recording, root, self._skin, self._show), arms.chest)
+        aside, behind = _place(len(self._people), self._spacing_m)
+        if aside or behind:
+            self._recording.log(root, rr.Transform3D(translation=(aside, 0.0, behind)), static=True)
             x, y, z = arms.chest.position
-            person.chest = Pose((x + offset, y, z), arms.chest.orientation)
+            person.chest = Pose((x + aside, y, z + behind), arms.chest.orientation)
         self._people[arms.avatar] = person
         log_styles(self._recording, root)
         person.sender.describe(self._described.get(arms.avatar) or skeleton_of(arms))
@@ -149,8 +178,15 @@ class RerunView:
             for name, one in self._people.items():
                 log_name(self._recording, one.root, name)
         roots = {name: one.root for name, one in self._people.items()}
-        self._recording.send_blueprint(blueprint_of(roots, [one.chest for one in self._people.values()]))
+        chests = [one.chest for one in self._people.values()]
+        self._recording.send_blueprint(blueprint_of(roots, chests, self._followed(root), whole=self._whole))
         return person
+
+
+def _place(index: int, spacing_m: float) -> tuple[float, float]:
+    """Where the next person stands, x and z [m]: in rows as for a group picture, each between two of those in front."""
+    row, column = divmod(index, ROW)
+    return spacing_m * (column + 0.5 * (row % 2)), spacing_m * row
 
 
 def _abandon(recording: rr.RecordingStream) -> None:

@@ -14,13 +14,13 @@ import numpy.typing as npt
 
 from arm_ik_service.errors import SettingsError
 from arm_ik_service.io.recording import RecordingWriter
-from arm_ik_service.io.rerun_view import RerunView, Sink, Skin
+from arm_ik_service.io.rerun_view import Overlay, RerunView, Sink, Skin
 from arm_ik_service.io.zenoh_streams import Bus, answer_queries, declare_stream, put_once, subscribe
 from arm_ik_service.programs.grab.scene import CUBE_M, RATE_HZ, Moment, Scene
 from arm_ik_service.skeleton import skeleton_of
 from arm_ik_service.wire import codec
 from arm_ik_service.wire.keys import Keys
-from arm_ik_service.wire.messages import Quaternion, Vector
+from arm_ik_service.wire.messages import Pose, Quaternion, Vector
 
 Floats = npt.NDArray[np.float64]
 
@@ -53,6 +53,11 @@ def cube_pose(payload: bytes) -> Floats:
     return pose
 
 
+def _pose(pose: Floats) -> Pose:
+    x, y, z, qx, qy, qz, qw = pose.tolist()
+    return Pose((x, y, z), (qx, qy, qz, qw))
+
+
 class GrabShow:
     """Runs a scene into sinks, a recording and an open Zenoh session, any of which may be missing."""
 
@@ -64,6 +69,7 @@ class GrabShow:
         keys: Keys | None = None,
         sinks: list[Sink] | None = None,
         skin: Skin | None = None,
+        overlays: frozenset[Overlay] = frozenset(),
         record: Path | None = None,
         say: Callable[[str], None] = lambda text: None,
     ) -> None:
@@ -76,12 +82,15 @@ class GrabShow:
         self._cube = scene.cube.copy()
         self.refused = 0
         self._skeleton = skeleton_of(self._avatar, scene.figure.profile)
-        self._view = RerunView(*sinks, name="arm-ik grab", skin=skin) if sinks else None
+        self._view = RerunView(*sinks, name="arm-ik grab", skin=skin, show=overlays) if sinks else None
         self._box = self._view.box("cube", CUBE_M) if self._view else None
         if self._view is not None:
             self._view.describe(self._skeleton)
+        self._legs = self._view.legs(self._avatar) if self._view else None
         self._writer = RecordingWriter(record, {"about": "arm-ik grab"}) if record else None
-        self._open_bus(bus, keys or Keys())
+        keys = keys or Keys()
+        self._cube_key = f"{keys.prefix}/{CUBE_KEY}" if keys.prefix else CUBE_KEY
+        self._open_bus(bus, keys)
 
     def stop(self) -> None:
         """Make `run` return; safe in a signal handler."""
@@ -131,10 +140,9 @@ class GrabShow:
         skeleton = codec.encode(self._skeleton)
         key = keys.skeleton(self._avatar)
         put_once(bus, key, skeleton, "msgpack")
-        cube_key = f"{keys.prefix}/{CUBE_KEY}" if keys.prefix else CUBE_KEY
         self._declared = [
-            subscribe(bus, cube_key, self._take_cube),
-            answer_queries(bus, cube_key, lambda: [(cube_key, self._told_cube)], "json"),
+            subscribe(bus, self._cube_key, self._take_cube),
+            answer_queries(bus, self._cube_key, lambda: [(self._cube_key, self._told_cube)], "json"),
             answer_queries(bus, key, lambda: [(key, lambda: skeleton)], "msgpack"),
             *self._streams,
         ]
@@ -151,8 +159,7 @@ class GrabShow:
 
     def _told_cube(self) -> bytes:
         with self._lock:
-            x, y, z, qx, qy, qz, qw = self._cube.tolist()
-        return msgspec.json.encode(CubePose((x, y, z), (qx, qy, qz, qw)))
+            return msgspec.json.encode(_pose(self._cube))
 
     def _show(self, count: int, moment: Moment) -> None:
         if self._streams is not None:
@@ -163,8 +170,11 @@ class GrabShow:
                 self._writer.write_skeleton(self._avatar, codec.encode(self._skeleton), moment.arms.receive_time_ns)
             self._writer.write_frame(self._avatar, moment.frame, moment.arms.receive_time_ns)
             self._writer.write_arms(self._avatar, moment.arms, moment.arms.receive_time_ns)
+            self._writer.write_pose(self._cube_key, _pose(moment.cube), moment.arms.receive_time_ns)
         if self._view is not None and self._box is not None:
             self._view.add(moment.arms, moment.frame)
             self._box.add(moment.arms.seq, moment.arms.sample_time_ns, moment.cube)
+            if self._legs is not None:
+                self._legs.add(moment.arms.seq, moment.arms.sample_time_ns, moment.legs)
             if self._view.watched and count % VIEW_EVERY == 0:
                 self._view.flush()

@@ -21,6 +21,7 @@ from arm_ik_service.ik.registry import DEFAULT, SolverChoice
 from arm_ik_service.io.synthesis.motion import minimum_jerk
 from arm_ik_service.programs.grab.figure import Figure, Trunk, about
 from arm_ik_service.programs.grab.helpers import PRIORITY, recruit
+from arm_ik_service.programs.grab.legs import legs
 from arm_ik_service.programs.grab.walk import Walker, cycle
 from arm_ik_service.wire.messages import ArmsState, ControllerFrame, Side
 
@@ -45,11 +46,15 @@ GAZE_MOST = (math.radians(60.0), math.radians(55.0))
 
 @dataclass(frozen=True)
 class Moment:
-    """One instant: what a headset would send, the arms, and the cube's centre with its axes (7,)."""
+    """One instant: what a headset would send, the arms, and the cube's centre with its axes (7,).
+
+    `legs` (2,4,3) [m] are left and right: hip, knee, ankle, toe. They are for the picture: no message holds them.
+    """
 
     frame: ControllerFrame
     arms: ArmsState
     cube: Floats
+    legs: Floats
     stage: Stage
     help_given: dict[str, float]
 
@@ -126,7 +131,7 @@ class Scene:
             self.cube = batch.compose(held, self._cube_in_hand)
         self._decide(held, found.position_error_m)
         given = dict(zip(PRIORITY, self._help.tolist(), strict=True))
-        return Moment(frame, arms, self.cube.copy(), self.stage, given)
+        return Moment(frame, arms, self.cube.copy(), self._legs(), self.stage, given)
 
     def _aim(self) -> Floats:
         """Where the person is going (3)."""
@@ -178,6 +183,11 @@ class Scene:
             height=bob - given[3],
             gaze=(float(self._gaze[0]), float(self._gaze[1])),
         )
+
+    def _legs(self) -> Floats:
+        walker, trunk = self._walker, self._trunk(self._help)
+        stature = self.figure.profile.body.stature_m
+        return legs(walker.place, walker.heading, trunk.height, stature, walker.phase, walker.stride)
 
     def _stand(self, dt: float) -> Floats:
         """Let clavicle, trunk and knees follow what the hand's target asks of them; returns the chest's pose (7,)."""

@@ -29,10 +29,15 @@ FACING_RAD = 0.5  # nobody walks off before facing about this near to where they
 
 
 def cycle(phase: float) -> Floats:
-    """Key-framed values (4,) at a phase, of period 1: a closed Catmull-Rom spline through the keys."""
-    place = (phase % 1.0) * len(_KEYS)
+    """Key-framed values (4,) at a phase, of period 1."""
+    return along_cycle(_KEYS, phase)
+
+
+def along_cycle(keys: Floats, phase: float) -> Floats:
+    """Values (k,) at a phase, of period 1, of a closed Catmull-Rom spline through keys (N,k)."""
+    place = (phase % 1.0) * len(keys)
     k, t = int(place), place - int(place)
-    a, b, c, d = (_KEYS[(k + i) % len(_KEYS)] for i in (-1, 0, 1, 2))
+    a, b, c, d = (keys[(k + i) % len(keys)] for i in (-1, 0, 1, 2))
     return np.asarray(0.5 * (2 * b + (c - a) * t + (2 * a - 5 * b + 4 * c - d) * t**2 + (3 * b - a - 3 * c + d) * t**3))
 
 
