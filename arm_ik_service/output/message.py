@@ -18,6 +18,7 @@ from arm_ik_service.compiled import compiled
 from arm_ik_service.output.record import OUTPUT
 from arm_ik_service.wire import codec
 from arm_ik_service.wire.messages import (
+    TRACKING_STATES,
     ArmsHeader,
     ArmsState,
     ArmState,
@@ -25,7 +26,6 @@ from arm_ik_service.wire.messages import (
     IsbShoulder,
     JointAngles,
     Pose,
-    TrackingState,
 )
 
 # what follows a step's bytes, or decides on them
@@ -36,7 +36,6 @@ SIZE_OF_MASK = 3  # the head of an array with an element for each set bit
 IF_EQUAL = 4  # the bytes only where the number is `operand`
 IF_BIT = 5  # the bytes only where this bit of the number is set
 
-_STATES: tuple[TrackingState, ...] = ("lost", "held", "inferred", "tracked")
 _text = msgspec.msgpack.encode
 assert len(LIMITS) <= 15, "the head of a longer array is no single byte"
 
@@ -70,7 +69,7 @@ def _pose(of: Any, name: str, begin: int) -> Pose:
 
 
 def _state(place: int) -> Any:
-    return _Choice(Step(_text(state), IF_EQUAL, place, n) for n, state in enumerate(_STATES))
+    return _Choice(Step(_text(state), IF_EQUAL, place, n) for n, state in enumerate(TRACKING_STATES))
 
 
 def _arm(side: int) -> ArmState:

@@ -9,12 +9,12 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 
-import msgspec
-
 from arm_ik_service.body.profile import Profile
+from arm_ik_service.errors import DecodeError
 from arm_ik_service.io.zenoh_inbox import Inbox
 from arm_ik_service.io.zenoh_streams import Bus, query_later
 from arm_ik_service.settings import ServiceSettings
+from arm_ik_service.wire.codec import MapDecoder
 from arm_ik_service.wire.keys import Keys
 
 log = logging.getLogger("arm_ik.service")
@@ -23,12 +23,7 @@ log = logging.getLogger("arm_ik.service")
 # those of somebody new
 CALIBRATIONS_EVERY, NEW_CALIBRATIONS_EVERY = 16, 4
 NEVER_S = float("inf")
-_profiles = msgspec.msgpack.Decoder(Profile), msgspec.json.Decoder(Profile)
-
-
-def decode_profile(payload: bytes) -> Profile:
-    """Raises msgspec.MsgspecError or UnicodeDecodeError where the bytes are none."""
-    return _profiles[payload[:1] == b"{"].decode(payload)
+profiles = MapDecoder(Profile)
 
 
 class LookOut:
@@ -88,6 +83,6 @@ class LookOut:
         if self._is_served(avatar) or len(self._profiles) >= 16 * self._limits.max_avatars:
             return
         try:
-            self._profiles[avatar] = decode_profile(payload)
-        except (msgspec.MsgspecError, UnicodeDecodeError):
+            self._profiles[avatar] = profiles.decode(payload)
+        except DecodeError:
             log.warning("avatar %s: a calibration that cannot be read", avatar)

@@ -10,9 +10,8 @@ import numpy as np
 
 from arm_ik_service.body.profile import Profile
 from arm_ik_service.io.zenoh_streams import Stream
-from arm_ik_service.wire.messages import AvatarHealth, TrackingState
-
-_WORST_FIRST: tuple[TrackingState, ...] = ("lost", "held", "inferred", "tracked")
+from arm_ik_service.wire.codec import MapDecoder
+from arm_ik_service.wire.messages import TRACKING_STATES, AvatarHealth, TrackingState
 
 
 class _Hand(msgspec.Struct):
@@ -27,7 +26,7 @@ class _Hands(msgspec.Struct):
     right: _Hand
 
 
-_hands = msgspec.msgpack.Decoder(_Hands), msgspec.json.Decoder(_Hands)
+_both_hands = MapDecoder(_Hands)
 
 
 @dataclass(slots=True)
@@ -65,14 +64,14 @@ class Seat:
             answered_share=answered / arrived if arrived else 1.0,
             latency_max_ms=latency_max_ns / 1e6,
             position_error_m=max((hand.position_error_m for hand in hands), default=0.0),
-            tracking=min((hand.tracking for hand in hands), key=_WORST_FIRST.index, default="lost"),
+            tracking=min((hand.tracking for hand in hands), key=TRACKING_STATES.index, default="lost"),
         )
 
     def _hands(self) -> tuple[_Hand, ...]:
         """Both hands as the last answer told them."""
         if self.last_payload is None:
             return ()
-        hands = _hands[self.last_payload[:1] == b"{"].decode(self.last_payload)
+        hands = _both_hands.decode(self.last_payload)
         return hands.left, hands.right
 
 

@@ -14,15 +14,13 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from threading import Lock
 
-import msgspec
-
 from arm_ik_service.avatar import Avatars
 from arm_ik_service.body.profile import Profile
 from arm_ik_service.errors import DecodeError, ModelError, ProfileError, VersionError, WireError
 from arm_ik_service.io.zenoh_inbox import Arrival, Inbox, InboxLimits
 from arm_ik_service.io.zenoh_streams import Bus, answer_queries, declare_stream, put_once, subscribe
 from arm_ik_service.programs.fleet import Fleet
-from arm_ik_service.programs.look_out import LookOut, decode_profile
+from arm_ik_service.programs.look_out import LookOut, profiles
 from arm_ik_service.programs.rehearsal import Rehearsal
 from arm_ik_service.programs.seats import Seat
 from arm_ik_service.programs.tally import Tally
@@ -309,8 +307,8 @@ class Service:
                 self._look_out.note_calibration(key, payload)
                 return
             try:
-                profile = decode_profile(payload)
-            except (msgspec.MsgspecError, UnicodeDecodeError) as error:
+                profile = profiles.decode(payload)
+            except DecodeError as error:
                 self._tally.refused("calibration", f"{avatar}: {error}", seat)
                 return
             try:

@@ -6,6 +6,7 @@ opens one with `{` and no MessagePack map can begin with that byte. Reading the 
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import Any, Generic, TypeVar
 
 import msgspec
@@ -33,36 +34,43 @@ class _Header(msgspec.Struct):
     version: int
 
 
-class Decoder(Generic[Message]):
-    """Decodes one kind of message from either form. Raises DecodeError or VersionError, never anything else."""
+class MapDecoder(Generic[Message]):
+    """Decodes a map of one kind from either form. Raises DecodeError, never anything else."""
 
     def __init__(self, kind: type[Message]) -> None:
         self._msgpack: Any = msgspec.msgpack.Decoder(kind)
         self._json: Any = msgspec.json.Decoder(kind)
-        self._msgpack_header = msgspec.msgpack.Decoder(_Header)
-        self._json_header = msgspec.json.Decoder(_Header)
 
     def decode(self, payload: bytes) -> Message:
-        """Return the message in `payload`; the error names the path of the field that is wrong."""
-        is_json = payload[:1] == b"{"
+        """Return what is in `payload`; the error names the path of the field that is wrong."""
         try:
-            message: Message = (self._json if is_json else self._msgpack).decode(payload)
+            found: Message = (self._json if payload[:1] == b"{" else self._msgpack).decode(payload)
         except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
-            self._refuse_other_version(payload, is_json)
             raise DecodeError(str(error)) from error
-        version = message.version  # type: ignore[attr-defined]
-        if version != VERSION:
-            raise VersionError(version, VERSION)
+        return found
+
+
+_headers = MapDecoder(_Header)
+
+
+class Decoder(MapDecoder[Message]):
+    """Decodes one kind of message, which has a version. Raises DecodeError or VersionError, never anything else."""
+
+    def decode(self, payload: bytes) -> Message:
+        """Return the message in `payload`; a newer one may well have another shape, so its version is told first."""
+        try:
+            message = super().decode(payload)
+        except DecodeError:
+            with suppress(DecodeError):
+                _check(_headers.decode(payload).version)
+            raise
+        _check(message.version)  # type: ignore[attr-defined]
         return message
 
-    def _refuse_other_version(self, payload: bytes, is_json: bool) -> None:
-        """Say that the version is the cause where it is: a newer message may well have another shape."""
-        try:
-            header = (self._json_header if is_json else self._msgpack_header).decode(payload)
-        except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
-            return
-        if header.version != VERSION:
-            raise VersionError(header.version, VERSION)
+
+def _check(version: int) -> None:
+    if version != VERSION:
+        raise VersionError(version, VERSION)
 
 
 controller_frames = Decoder(ControllerFrame)

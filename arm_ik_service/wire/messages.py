@@ -6,7 +6,7 @@ ignore what they do not know. Anything else is a new version.
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 from msgspec import Meta, Struct
 
@@ -26,6 +26,7 @@ FULLY_TRACKED = ORIENTATION_VALID | POSITION_VALID | ORIENTATION_TRACKED | POSIT
 
 Space = Literal["stage", "local_floor", "local"]
 TrackingState = Literal["lost", "held", "inferred", "tracked"]
+TRACKING_STATES: tuple[TrackingState, ...] = get_args(TrackingState)  # from the worst to the best
 Encoding = Literal["msgpack", "json"]
 Side = Literal["left", "right"]
 SIDES: tuple[Side, Side] = ("left", "right")

@@ -12,11 +12,11 @@ from arm_ik_service.geometry import batch
 from arm_ik_service.io.rerun_view import figure
 from arm_ik_service.io.rerun_view.overlays import HIDDEN, Overlay, OverlaySender
 from arm_ik_service.io.rerun_view.palette import LATENCY_COLOURS, LIMIT, NAME, RESIDUAL, SIDE_COLOURS, STATE_COLOURS
-from arm_ik_service.io.rerun_view.rows import ANGLES, LATENCIES, PLACES, STATES, Floats, Rows
+from arm_ik_service.io.rerun_view.rows import ANGLES, LATENCIES, PLACES, Floats, Rows
 from arm_ik_service.io.rerun_view.skinned import Skin, SkinSender
 from arm_ik_service.io.rerun_view.solids import Solid
 from arm_ik_service.io.rerun_view.timelines import Integers, time_columns
-from arm_ik_service.wire.messages import SIDES, VERSION, ArmsState, Pose, Side, Skeleton, TrackingState
+from arm_ik_service.wire.messages import SIDES, TRACKING_STATES, VERSION, ArmsState, Pose, Side, Skeleton, TrackingState
 
 NECK_ROOT = (0.0, 0.065, 0.004)  # top of the torso in the chest frame [m]
 GIRDLE_ROOT = (0.035, 0.014, 0.0)  # of the right side, in the chest frame [m]
@@ -105,7 +105,7 @@ def log_styles(recording: rr.RecordingStream, root: str) -> None:
         )
         recording.log(
             f"{root}/plots/tracking/{side}",
-            rr.StateConfiguration(values=STATES, colors=[STATE_COLOURS[state] for state in STATES]),
+            rr.StateConfiguration(values=TRACKING_STATES, colors=[STATE_COLOURS[state] for state in TRACKING_STATES]),
             static=True,
         )
 
@@ -122,6 +122,14 @@ def between_y(direction: Floats) -> Floats:
     turned = np.stack([d[:, 2], np.zeros(len(d)), -d[:, 0], 1.0 + d[:, 1]], axis=-1)
     turned[d[:, 1] < -1.0 + 1e-9] = (1.0, 0.0, 0.0, 0.0)
     return batch.normalized(turned)
+
+
+def spanning(start: Floats, end: Floats, length_m: float) -> rr.ComponentColumnList:
+    """Columns that stretch a solid built along +Y, `length_m` long, from start to end (N,3)."""
+    axis = end - start
+    scale = np.ones_like(axis)
+    scale[:, 1] = np.linalg.norm(axis, axis=1) / length_m
+    return rr.Transform3D.columns(translation=start, quaternion=between_y(axis), scale=scale)
 
 
 class Sender:
@@ -189,20 +197,13 @@ class Sender:
         scale[:, 1] = np.linalg.norm(end[:, :3] - bone[:, :3], axis=1) / length_m
         self._columns(entity, rr.Transform3D.columns(translation=bone[:, :3], quaternion=bone[:, 3:], scale=scale))
 
-    def _span(self, entity: str, start: Floats, end: Floats, length_m: float) -> None:
-        """Stretch a solid that is built along +Y, `length_m` long, from start to end (N,3)."""
-        axis = end - start
-        scale = np.ones_like(axis)
-        scale[:, 1] = np.linalg.norm(axis, axis=1) / length_m
-        self._columns(entity, rr.Transform3D.columns(translation=start, quaternion=between_y(axis), scale=scale))
-
     def _send_trunk(self, values: Floats) -> None:
         chest, head = values[:, PLACES["chest"]], values[:, PLACES["head"]]
         self._move("chest", chest)
         self._move("head", head)
         root = chest[:, :3] + batch.rotate(chest[:, 3:], NECK_ROOT)
         top = head[:, :3] + batch.rotate(head[:, 3:], SKULL_BASE)
-        self._span("neck", root, top, figure.NECK_M)
+        self._columns("neck", spanning(root, top, figure.NECK_M))
 
     def _send_side(self, side: Side, values: Floats) -> None:
         upper_arm, forearm, hand, target = (
@@ -211,7 +212,7 @@ class Sender:
         chest = values[:, PLACES["chest"]]
         x, y, z = GIRDLE_ROOT
         root = chest[:, :3] + batch.rotate(chest[:, 3:], (-x if side == "left" else x, y, z))
-        self._span(f"{side}/shoulder", root, upper_arm[:, :3], figure.GIRDLE_M)
+        self._columns(f"{side}/shoulder", spanning(root, upper_arm[:, :3], figure.GIRDLE_M))
         for name, bone, end in (("upper_arm", upper_arm, forearm), ("forearm", forearm, hand)):
             self._stretch(f"{side}/{name}", bone, end, self._lengths_m[name])
         self._move(f"{side}/hand", hand)

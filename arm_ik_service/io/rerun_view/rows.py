@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -29,7 +28,6 @@ from arm_ik_service.wire.messages import (
 Floats = npt.NDArray[np.float64]
 
 ANGLES: tuple[str, ...] = JointAngles.__struct_fields__
-STATES: tuple[TrackingState, ...] = get_args(TrackingState)
 BONES = ("upper_arm", "forearm", "hand")
 RESTS = ("shoulder_swing", *ANGLES[2:])  # names in ArmState.limits of the limits an arm rests on
 LATENCIES = ("network", "solve", "total")

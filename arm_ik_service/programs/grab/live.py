@@ -12,13 +12,14 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from arm_ik_service.errors import SettingsError
+from arm_ik_service.errors import DecodeError, SettingsError
 from arm_ik_service.io.recording import RecordingWriter
 from arm_ik_service.io.rerun_view import Overlay, RerunView, Sink, Skin
 from arm_ik_service.io.zenoh_streams import Bus, answer_queries, declare_stream, put_once, subscribe
 from arm_ik_service.programs.grab.scene import CUBE_M, RATE_HZ, Moment, Scene
 from arm_ik_service.skeleton import skeleton_of
 from arm_ik_service.wire import codec
+from arm_ik_service.wire.codec import MapDecoder
 from arm_ik_service.wire.keys import Keys
 from arm_ik_service.wire.messages import Pose, Quaternion, Vector
 
@@ -36,14 +37,14 @@ class CubePose(msgspec.Struct, frozen=True):
     orientation: Quaternion = (0.0, 0.0, 0.0, 1.0)
 
 
+_cube_poses = MapDecoder(CubePose)
+
+
 def cube_pose(payload: bytes) -> Floats:
     """Return the pose (7,) that a payload holds. Raises SettingsError naming what is wrong with it."""
     try:
-        if payload[:1] == b"{":
-            told = msgspec.json.decode(payload, type=CubePose)
-        else:
-            told = msgspec.msgpack.decode(payload, type=CubePose)
-    except (msgspec.MsgspecError, UnicodeDecodeError) as error:
+        told = _cube_poses.decode(payload)
+    except DecodeError as error:
         raise SettingsError(f"{CUBE_KEY}: {error}") from error
     pose = np.array([*told.position, *told.orientation])
     length = float(np.linalg.norm(pose[3:]))
