@@ -68,19 +68,7 @@ Access = Annotated[
 ]
 
 
-def _of_a_client(
-    connect: Connect = None,
-    listen: Listen = None,
-    scouting: Scouting = False,
-    zenoh_config: ZenohConfig = None,
-    tls_cert: TlsCertificate = None,
-    tls_key: TlsKey = None,
-    tls_ca: TlsAuthority = None,
-) -> BusOptions:
-    return _of_a_hub(connect, listen, scouting, zenoh_config, tls_cert, tls_key, tls_ca)
-
-
-def _of_a_hub(
+def _gathered(
     connect: Connect = None,
     listen: Listen = None,
     scouting: Scouting = False,
@@ -106,22 +94,22 @@ def _of_a_hub(
     return BusOptions(tuple(connect or ()), tuple(listen or ()), scouting, zenoh_config, tls, access)
 
 
-def _taking(gather: Callable[..., BusOptions], command: Callable[..., None]) -> Callable[..., None]:
-    """Put the parameters of `gather` in the place of the command's `zenoh`."""
+def _taking(command: Callable[..., None], *, without: frozenset[str]) -> Callable[..., None]:
+    """Put the parameters of `_gathered` but some in the place of the command's `zenoh`."""
     names = {"BusOptions": object}  # imported for the type checker alone: the help does not wait for Zenoh
-    options = inspect.signature(gather).parameters
+    options = [one for name, one in inspect.signature(_gathered).parameters.items() if name not in without]
 
     @functools.wraps(command)
     def run(**given: Any) -> None:
-        zenoh = gather(**{name: given.pop(name) for name in options})
+        zenoh = _gathered(**{option.name: given.pop(option.name) for option in options})
         command(**given, **{_ARGUMENT: zenoh})
 
     hints = get_type_hints(command, localns=names, include_extras=True)
-    hints |= get_type_hints(gather, localns=names, include_extras=True)
+    hints |= get_type_hints(_gathered, localns=names, include_extras=True)
     own = [parameter for parameter in inspect.signature(command).parameters.values() if parameter.name != _ARGUMENT]
     parameters = [
         parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY, annotation=hints[parameter.name])
-        for parameter in (*own, *options.values())
+        for parameter in (*own, *options)
     ]
     run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
     run.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
@@ -130,9 +118,9 @@ def _taking(gather: Callable[..., BusOptions], command: Callable[..., None]) -> 
 
 def opens_client(command: Callable[..., None]) -> Callable[..., None]:
     """Let a command that connects to a service take the Zenoh options."""
-    return _taking(_of_a_client, command)
+    return _taking(command, without=frozenset({"access"}))
 
 
 def opens_hub(command: Callable[..., None]) -> Callable[..., None]:
     """Let a command that others connect to take the Zenoh options and `--access`."""
-    return _taking(_of_a_hub, command)
+    return _taking(command, without=frozenset())
