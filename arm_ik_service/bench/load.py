@@ -69,6 +69,7 @@ class Load:
         self._doubles: list[int] = []  # when they came
         self.healths: list[Health] = []
         self.began_ns = 0
+        self._stopped = False
         self._subscribers = [
             subscribe(bus, keys.arms(), self._receive),
             subscribe(bus, keys.health(), self._receive_health),
@@ -95,6 +96,10 @@ class Load:
         """Time since the first frame was due."""
         return (time.monotonic_ns() - self.began_ns) / 1e9
 
+    def stop(self) -> None:
+        """Make `run` end with the frames in hand, before its time."""
+        self._stopped = True
+
     def run(self, *, progress: Callable[[int], None] | None = None) -> None:
         """Send it all, and wait a moment for the last answers."""
         give_up_s = time.monotonic() + LISTENED_WITHIN_S
@@ -108,6 +113,8 @@ class Load:
             start_s = time.monotonic() + 0.01
             self.began_ns = int(start_s * 1e9)
             for seq in range(self._frames):
+                if self._stopped:
+                    break
                 payload = codec.encode(moving(seq, self._rate_hz))
                 at_s = start_s + seq * period_s
                 late_s = time.monotonic() - at_s
