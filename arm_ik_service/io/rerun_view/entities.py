@@ -119,8 +119,11 @@ def log_name(recording: rr.RecordingStream, root: str, name: str) -> None:
 def between_y(direction: Floats) -> Floats:
     """Shortest rotations (N,4) that take +Y to the directions (N,3), which need not be of unit length."""
     d = batch.normalized(direction)
-    turned = np.stack([d[:, 2], np.zeros(len(d)), -d[:, 0], 1.0 + d[:, 1]], axis=-1)
-    turned[d[:, 1] < -1.0 + 1e-9] = (1.0, 0.0, 0.0, 0.0)
+    aside = d[:, 0] ** 2 + d[:, 2] ** 2
+    # 1 + y, without its cancellation where a solid hangs straight down, as legs do
+    w = np.where(d[:, 1] < 0.0, aside / (1.0 - np.minimum(d[:, 1], 0.0)), 1.0 + d[:, 1])
+    turned = np.stack([d[:, 2], np.zeros(len(d)), -d[:, 0], w], axis=-1)
+    turned[(d[:, 1] < 0.0) & (aside < 1e-24)] = (1.0, 0.0, 0.0, 0.0)
     return batch.normalized(turned)
 
 
