@@ -73,8 +73,7 @@ def test_a_bone_reaches_from_its_joint_to_the_next(length_m: float) -> None:
         assert solid.vertices[:, 1].min() == pytest.approx(-length_m, abs=0.05)
 
 
-@example((1e-4, -1.0, 0.0))  # straight down but for a little
-@example((3e-9, -1.0, 1e-9))
+@example((3e-5, -1.0, 0.0))  # straight down but for a little
 @given(st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda v: np.linalg.norm(v) > 1e-3))
 def test_a_spanning_solid_points_along_its_direction(direction: tuple[float, float, float]) -> None:
     axis = np.array([direction, (0.0, -1.0, 0.0)])
