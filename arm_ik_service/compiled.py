@@ -23,13 +23,18 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 Record = Any  # a numpy record: attribute access in compiled code and, as `np.record`, in plain Python too
 
 
-def compiled(function: Function) -> Function:
+def compiled(function: Function, *, inline: bool = False) -> Function:
     """Compile `function` with numba on first use: cached on disk, GIL released, IEEE division as numpy does it."""
-    dispatcher = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
+    dispatcher = numba.njit(cache=True, nogil=True, error_model="numpy", forceinline=inline)(function)
     with suppress(AttributeError):  # plain Python under NUMBA_DISABLE_JIT; a private name, should numba rename it
         index = cast(Any, dispatcher)._cache._cache_file
         index._source_stamp = (index._source_stamp, _sources())
     return cast(Function, dispatcher)
+
+
+def inlined(function: Function) -> Function:
+    """Compile `function` into whatever calls it: for small ones of the hot loop, so that tuples stay in registers."""
+    return compiled(function, inline=True)
 
 
 @cache

@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from arm_ik_service.arm import tangent
+from arm_ik_service.arm.configuration import difference, read_configuration
 from arm_ik_service.arm.model import ArmModel
 from arm_ik_service.body.state import TARGET
 from arm_ik_service.compiled import compiled
 from arm_ik_service.geometry import batch
 from arm_ik_service.ik.state import new_arm
 from arm_ik_service.ik.step import step_arm
-from arm_ik_service.ik.velocity import difference
 from arm_ik_service.settings import SolverSettings, to_record
 
 Array = npt.NDArray[np.float64]
@@ -128,5 +129,6 @@ def central_differences(configuration: Array, dt_s: float) -> Array:
     """Velocity (N, 9) of the published configurations; the first and last row are not a number."""
     out = np.full((len(configuration), 9), np.nan)
     for n in range(1, len(configuration) - 1):
-        difference(configuration[n - 1], configuration[n + 1], 2 * dt_s, out[n])
+        before, after = read_configuration(configuration[n - 1]), read_configuration(configuration[n + 1])
+        tangent.store(out[n], tangent.scale(0.5 / dt_s, difference(before, after)))
     return out

@@ -8,12 +8,11 @@ the joint axes that J^T e and J s need anyway.
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
 
-from arm_ik_service.compiled import Record, compiled, record_dtype
+from arm_ik_service.compiled import Record, compiled, inlined, record_dtype
 from arm_ik_service.geometry.scalar import (
     Quaternion,
     Vector,
@@ -25,6 +24,7 @@ from arm_ik_service.geometry.scalar import (
     rotate,
     scale,
 )
+from arm_ik_service.geometry.trigonometry import sine_cosine
 
 Columns = tuple[Vector, Vector, Vector]
 
@@ -35,22 +35,25 @@ CHAIN = record_dtype(
         ("bone_from_hand", np.float64, (4,)),  # ISB hand axes from the OpenXR wrist frame
         ("upper_arm_m", np.float64),
         ("forearm_m", np.float64),
+        ("nearest_m", np.float64),  # wrist to shoulder with the elbow fully bent
         ("lower", np.float64, (6,)),  # the six hinges [rad], order of the configuration
         ("upper", np.float64, (6,)),
         ("twist_lower", np.float64),  # humerus, external [rad]
         ("twist_upper", np.float64),  # internal
+        ("twist_middle", np.float64, (2,)),  # cosine and sine of the middle of that range
+        ("twist_surely_inside", np.float64),  # cosine of an angle from the middle that lies inside at any height
         ("swing_centre", np.float64, (3,)),  # unit direction in the middle of the shoulder's swing region
         ("swing_side", np.float64, (3,)),  # azimuth 0 around it
         ("swing_up", np.float64, (3,)),  # azimuth 90 degrees
         ("swing_cosines", np.float64, (5,)),  # Fourier series of the angle from the centre to the edge [rad]
         ("swing_sines", np.float64, (5,)),
-        ("swing_surely_inside", np.float64),  # cosine of an angle from the centre that no edge comes below
+        ("swing_surely_inside", np.float64, (8,)),  # cosine of an angle inside the edge by 0.1 rad, for each octant
         ("speed_limit", np.float64, (9,)),  # [rad/s], tangent order
     ]
 )
 
 
-@compiled
+@inlined
 def columns_of(q: Quaternion) -> Columns:
     """Return the rotated x, y and z axes of a unit quaternion."""
     x, y, z, w = q
@@ -61,17 +64,17 @@ def columns_of(q: Quaternion) -> Columns:
     )
 
 
-@compiled
+@inlined
 def turn(a: Vector, b: Vector, angle: float) -> tuple[Vector, Vector]:
     """Rotate the orthonormal pair (a, b) in its own plane, a towards b [rad]."""
-    c, s = math.cos(angle), math.sin(angle)
+    s, c = sine_cosine(angle)
     return (
         (c * a[0] + s * b[0], c * a[1] + s * b[1], c * a[2] + s * b[2]),
         (c * b[0] - s * a[0], c * b[1] - s * a[1], c * b[2] - s * a[2]),
     )
 
 
-@compiled
+@inlined
 def turn_group(base: Columns, about_z: float, about_x: float, about_y: float) -> tuple[Vector, Vector, Columns]:
     """Three hinges Z, X, Y on the bone `base`: the axes of the second and third hinge, and the next bone's columns."""
     x, y = turn(base[0], base[1], about_z)

@@ -13,10 +13,9 @@ axes (the model's tangent), so `gradient . omega` is the rate at which the limit
 from __future__ import annotations
 
 import math
-from typing import Any
 
-from arm_ik_service.arm.chain import Columns
-from arm_ik_service.compiled import Record, compiled
+from arm_ik_service.arm.chain import Columns, columns_of
+from arm_ik_service.compiled import Record, compiled, inlined
 from arm_ik_service.geometry.scalar import (
     Quaternion,
     Vector,
@@ -28,6 +27,7 @@ from arm_ik_service.geometry.scalar import (
     rotation_y,
     scale,
 )
+from arm_ik_service.geometry.trigonometry import angle_of
 
 _OPENS_AT = 0.766  # height of the humerus' direction, sine of 50 degrees above horizontal
 _OPEN_AT = 0.966  # sine of 75 degrees
@@ -36,7 +36,7 @@ _OPEN_AT = 0.966  # sine of 75 degrees
 @compiled
 def twist_of(bone: Columns) -> float:
     """Twist about y [rad] in (-pi, pi] of a rotation given as columns."""
-    return math.atan2(bone[2][0] - bone[0][2], bone[0][0] + bone[2][2])
+    return angle_of(bone[2][0] - bone[0][2], bone[0][0] + bone[2][2])
 
 
 @compiled
@@ -47,15 +47,41 @@ def _opening(height: float) -> float:
 
 
 @compiled
-def twist_excess(chain: Record, twist: float, height: float) -> float:
-    """Angle [rad] by which a twist leaves its range: negative below, positive above, 0 inside.
-
-    `height` is the y of the humerus' direction: -1 hanging, 1 straight up.
-    """
+def twist_range(chain: Record, height: float) -> tuple[float, float]:
+    """Range of the humerus' twist [rad] at a height, the y of its direction: -1 hanging, 1 straight up."""
     open_ = _opening(height)
     lower = chain.twist_lower - open_ * (math.pi + chain.twist_lower)
-    upper = chain.twist_upper + open_ * (math.pi - chain.twist_upper)
+    return lower, chain.twist_upper + open_ * (math.pi - chain.twist_upper)
+
+
+@compiled
+def twist_excess(chain: Record, twist: float, height: float) -> float:
+    """Angle [rad] by which a twist leaves its range: negative below, positive above, 0 inside."""
+    lower, upper = twist_range(chain, height)
     return twist - lower if twist < lower else (twist - upper if twist > upper else 0.0)
+
+
+@inlined
+def octant(cosine: float, sine: float) -> int:
+    """Which eighth of a turn a point lies in; in no order."""
+    return (1 if cosine > 0.0 else 0) | (2 if sine > 0.0 else 0) | (4 if abs(sine) > abs(cosine) else 0)
+
+
+@inlined
+def swing_surely_inside(chain: Record, bone: Columns) -> bool:
+    """Tell without an arc tangent that a humerus is inside its swing region, by 0.1 rad at least."""
+    y, centre, a, b = bone[1], chain.swing_centre, chain.swing_side, chain.swing_up
+    along = y[0] * centre[0] + y[1] * centre[1] + y[2] * centre[2]
+    where = octant(-(y[0] * a[0] + y[1] * a[1] + y[2] * a[2]), -(y[0] * b[0] + y[1] * b[1] + y[2] * b[2]))
+    return bool(-along > chain.swing_surely_inside[where])
+
+
+@inlined
+def twist_surely_inside(chain: Record, bone: Columns) -> bool:
+    """Tell without an arc tangent that a humerus is inside its twist range, by 1e-6 rad at least."""
+    cosine, sine = bone[0][0] + bone[2][2], bone[2][0] - bone[0][2]
+    along = cosine * chain.twist_middle[0] + sine * chain.twist_middle[1]
+    return bool(along > chain.twist_surely_inside * math.sqrt(cosine * cosine + sine * sine))
 
 
 @compiled
@@ -80,16 +106,13 @@ def swing_edge(chain: Record, cosine: float, sine: float) -> tuple[float, float]
 
 @compiled
 def swing_excess(chain: Record, direction: Vector) -> float:
-    """Angle [rad] by which the humerus' unit direction lies beyond the edge; negative inside, -1 deep inside."""
-    centre = chain.swing_centre
+    """Angle [rad] by which the humerus' unit direction lies beyond the edge; negative inside."""
+    centre, a, b = chain.swing_centre, chain.swing_side, chain.swing_up
     along = direction[0] * centre[0] + direction[1] * centre[1] + direction[2] * centre[2]
-    if along > chain.swing_surely_inside:
-        return -1.0
-    a, b = chain.swing_side, chain.swing_up
     x = direction[0] * a[0] + direction[1] * a[1] + direction[2] * a[2]
     y = direction[0] * b[0] + direction[1] * b[1] + direction[2] * b[2]
     n = max(math.sqrt(x * x + y * y), 1e-9)
-    return math.atan2(n, along) - swing_edge(chain, x / n, y / n)[0]
+    return angle_of(n, along) - swing_edge(chain, x / n, y / n)[0]
 
 
 @compiled
@@ -114,6 +137,8 @@ def swing_gradient(chain: Record, bone: Columns) -> Vector:
 @compiled
 def clamp_twist(chain: Record, q: Quaternion, bone: Columns) -> Quaternion:
     """Return the humerus turned back about itself to the edge of the twist range, if it lies beyond."""
+    if twist_surely_inside(chain, bone):
+        return q
     excess = twist_excess(chain, twist_of(bone), -bone[1][1])
     return q if excess == 0.0 else multiply(q, rotation_y(-excess))
 
@@ -121,8 +146,7 @@ def clamp_twist(chain: Record, q: Quaternion, bone: Columns) -> Quaternion:
 @compiled
 def clamp_swing(chain: Record, q: Quaternion, bone: Columns) -> Quaternion:
     """Return the humerus swung straight towards the centre to the edge of its region, if it lies beyond."""
-    u = scale(-1.0, bone[1])
-    excess = swing_excess(chain, u)
+    excess = swing_excess(chain, scale(-1.0, bone[1]))
     if excess <= 0.0:
         return q
     centre = chain.swing_centre
@@ -133,8 +157,22 @@ def clamp_swing(chain: Record, q: Quaternion, bone: Columns) -> Quaternion:
     return normalized(multiply(q, exp((-cz * excess / n, 0.0, cx * excess / n))))
 
 
-@compiled
-def clamp_hinges(chain: Record, configuration: Any) -> None:
-    """Clip the six hinges of a configuration (10,) to their ranges, in place."""
-    for i in range(6):
-        configuration[4 + i] = clip(configuration[4 + i], chain.lower[i], chain.upper[i])
+@inlined
+def clamp_shoulder(chain: Record, q: Quaternion) -> Quaternion:
+    """Return the humerus brought inside its swing and twist limits: swung back first, then turned back."""
+    bone = columns_of(q)
+    if swing_surely_inside(chain, bone) and twist_surely_inside(chain, bone):
+        return q
+    q = clamp_swing(chain, q, bone)
+    return clamp_twist(chain, q, columns_of(q))
+
+
+@inlined
+def clamp_group(chain: Record, first: int, angles: Vector) -> Vector:
+    """Return three hinges, the first of them at an index of the ranges, clipped to these."""
+    lower, upper = chain.lower, chain.upper
+    return (
+        clip(angles[0], lower[first], upper[first]),
+        clip(angles[1], lower[first + 1], upper[first + 1]),
+        clip(angles[2], lower[first + 2], upper[first + 2]),
+    )

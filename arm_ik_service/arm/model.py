@@ -14,7 +14,8 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from arm_ik_service.arm.chain import CHAIN, columns_of, forward_poses
-from arm_ik_service.arm.limits import clamp_hinges, clamp_swing, clamp_twist, swing_excess, twist_excess, twist_of
+from arm_ik_service.arm.configuration import clamped, read_configuration, store_configuration
+from arm_ik_service.arm.limits import octant, swing_excess, twist_excess, twist_of
 from arm_ik_service.compiled import compiled
 from arm_ik_service.errors import ModelError
 from arm_ik_service.geometry.batch import log, rotate
@@ -297,7 +298,12 @@ def _flatten(model: Any, numbers: dict[str, list[float]], side: Side, path: Path
     chain["upper_arm_m"] = -model.jointPlacements[2].translation[1]
     chain["forearm_m"] = -model.jointPlacements[3].translation[1]
     chain["lower"], chain["upper"] = model.lowerPositionLimit[4:], model.upperPositionLimit[4:]
-    chain["twist_lower"], chain["twist_upper"] = np.radians(numbers["shoulder_twist_range"])
+    bones_m = chain["upper_arm_m"], chain["forearm_m"]
+    chain["nearest_m"] = np.sqrt(bones_m[0] ** 2 + bones_m[1] ** 2 + 2.0 * np.prod(bones_m) * np.cos(chain["upper"][0]))
+    lower, upper = np.radians(numbers["shoulder_twist_range"])
+    chain["twist_lower"], chain["twist_upper"] = lower, upper
+    chain["twist_middle"] = np.cos(0.5 * (lower + upper)), np.sin(0.5 * (lower + upper))
+    chain["twist_surely_inside"] = np.cos(0.5 * (upper - lower) - 1e-6)
     chain["speed_limit"] = numbers["joint_speed_limit"]
     centre = np.array(numbers["shoulder_swing_centre"])
     if abs(centre[1]) > _TOLERANCE or np.linalg.norm(centre) < _TOLERANCE:
@@ -307,10 +313,13 @@ def _flatten(model: Any, numbers: dict[str, list[float]], side: Side, path: Path
     chain["swing_side"] = np.cross(chain["swing_up"], chain["swing_centre"])
     cosines, sines = edge_series(numbers["shoulder_swing_edge"])
     chain["swing_cosines"], chain["swing_sines"] = cosines, sines
-    azimuth = np.linspace(-np.pi, np.pi, 721)
+    azimuth = np.linspace(-np.pi, np.pi, 8 * 90 + 1)
     k = np.arange(5)[:, None]
     edge = cosines @ np.cos(k * azimuth) + sines @ np.sin(k * azimuth)
-    chain["swing_surely_inside"] = np.cos(edge.min() - 0.01)
+    least = np.full(8, np.pi)
+    for cosine, sine, angle in zip(np.cos(azimuth), np.sin(azimuth), edge, strict=True):
+        least[octant(cosine, sine)] = min(least[octant(cosine, sine)], angle)
+    chain["swing_surely_inside"] = np.cos(least - 0.1)
     return chains
 
 
@@ -323,15 +332,8 @@ def edge_series(edge_deg: Sequence[float]) -> tuple[Array, Array]:
 
 @compiled
 def _clamp_rows(chains: Any, rows: Any) -> None:
-    chain = chains[0]
     for n in range(len(rows)):
-        row = rows[n]
-        q = (row[0], row[1], row[2], row[3])
-        q = clamp_swing(chain, q, columns_of(q))
-        q = clamp_twist(chain, q, columns_of(q))
-        for i in range(4):
-            row[i] = q[i]
-        clamp_hinges(chain, row)
+        store_configuration(rows[n], clamped(chains[0], read_configuration(rows[n])))
 
 
 @compiled

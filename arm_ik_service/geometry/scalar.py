@@ -9,7 +9,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from arm_ik_service.compiled import compiled
+from arm_ik_service.compiled import compiled, inlined
+from arm_ik_service.geometry.trigonometry import angle_of, half_turn, sine_cosine
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
@@ -20,13 +21,13 @@ Z: Vector = (0.0, 0.0, 1.0)
 IDENTITY: Quaternion = (0.0, 0.0, 0.0, 1.0)
 
 
-@compiled
+@inlined
 def vector(a: Any) -> Vector:
     """Read three numbers of an array into a vector."""
     return (a[0], a[1], a[2])
 
 
-@compiled
+@inlined
 def quaternion(a: Any) -> Quaternion:
     """Read four numbers of an array into a quaternion."""
     return (a[0], a[1], a[2], a[3])
@@ -39,49 +40,67 @@ def store(out: Any, value: Any) -> None:
         out[i] = value[i]
 
 
-@compiled
+@inlined
 def add(a: Vector, b: Vector) -> Vector:
     """a + b."""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
 
 
-@compiled
+@inlined
 def subtract(a: Vector, b: Vector) -> Vector:
     """a - b."""
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
 
 
-@compiled
+@inlined
 def scale(s: float, a: Vector) -> Vector:
     """s a."""
     return (s * a[0], s * a[1], s * a[2])
 
 
-@compiled
+@inlined
 def lerp(a: Vector, b: Vector, s: float) -> Vector:
     """a at s = 0, b at s = 1."""
     return (a[0] + s * (b[0] - a[0]), a[1] + s * (b[1] - a[1]), a[2] + s * (b[2] - a[2]))
 
 
-@compiled
+@inlined
 def dot(a: Vector, b: Vector) -> float:
     """Inner product."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@compiled
+@inlined
 def cross(a: Vector, b: Vector) -> Vector:
     """Vector product."""
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
-@compiled
+@inlined
+def times(a: Vector, b: Vector) -> Vector:
+    """Entry by entry product."""
+    return (a[0] * b[0], a[1] * b[1], a[2] * b[2])
+
+
+@inlined
+def over(a: Vector, b: Vector) -> Vector:
+    """Entry by entry quotient."""
+    return (a[0] / b[0], a[1] / b[1], a[2] / b[2])
+
+
+@inlined
+def largest(a: Vector) -> float:
+    """Largest magnitude of an entry."""
+    return max(abs(a[0]), abs(a[1]), abs(a[2]))
+
+
+@inlined
 def norm(a: Vector) -> float:
     """Length."""
     return math.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
 
 
-@compiled
+@inlined
 def clip(x: float, lower: float, upper: float) -> float:
     """Return x held to [lower, upper]."""
     return lower if x < lower else (upper if x > upper else x)
@@ -97,7 +116,7 @@ def wrap(angle: float) -> float:
     return angle
 
 
-@compiled
+@inlined
 def multiply(a: Quaternion, b: Quaternion) -> Quaternion:
     """Hamilton product: first b, then a."""
     return (
@@ -108,20 +127,44 @@ def multiply(a: Quaternion, b: Quaternion) -> Quaternion:
     )
 
 
-@compiled
+@inlined
+def combine(weights: Vector, axes: tuple[Vector, Vector, Vector]) -> Vector:
+    """Sum of three vectors, weighted: a matrix given by its columns times a vector."""
+    (a, b, c), (x, y, z) = weights, axes
+    return (
+        a * x[0] + b * y[0] + c * z[0],
+        a * x[1] + b * y[1] + c * z[1],
+        a * x[2] + b * y[2] + c * z[2],
+    )
+
+
+@inlined
+def components(axes: tuple[Vector, Vector, Vector], v: Vector) -> Vector:
+    """Inner products of a vector with three others: a transposed matrix, given by its columns, times a vector."""
+    return (dot(axes[0], v), dot(axes[1], v), dot(axes[2], v))
+
+
+@inlined
 def conjugate(q: Quaternion) -> Quaternion:
     """Inverse of a unit quaternion."""
     return (-q[0], -q[1], -q[2], q[3])
 
 
-@compiled
+@inlined
 def normalized(q: Quaternion) -> Quaternion:
     """Scale to unit length; q must not be zero."""
     n = 1.0 / math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
     return (q[0] * n, q[1] * n, q[2] * n, q[3] * n)
 
 
-@compiled
+@inlined
+def renormalized(q: Quaternion) -> Quaternion:
+    """Undo what rounding does to a length: one Newton step of 1 / length, exact for a length within 1e-8 of one."""
+    n = 1.5 - 0.5 * (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+    return (q[0] * n, q[1] * n, q[2] * n, q[3] * n)
+
+
+@inlined
 def rotate(q: Quaternion, v: Vector) -> Vector:
     """Turn v by the unit quaternion q."""
     tx = 2.0 * (q[1] * v[2] - q[2] * v[1])
@@ -134,12 +177,11 @@ def rotate(q: Quaternion, v: Vector) -> Vector:
     )
 
 
-@compiled
+@inlined
 def exp(w: Vector) -> Quaternion:
     """Rotation vector [rad] to unit quaternion."""
-    angle = norm(w)
-    s = 0.5 if angle < 1e-9 else math.sin(0.5 * angle) / angle
-    return (s * w[0], s * w[1], s * w[2], math.cos(0.5 * angle))
+    s, c = half_turn(dot(w, w))
+    return (s * w[0], s * w[1], s * w[2], c)
 
 
 @compiled
@@ -147,26 +189,28 @@ def log(q: Quaternion) -> Vector:
     """Unit quaternion to the shortest rotation vector [rad], length at most pi."""
     sign = -1.0 if q[3] < 0.0 else 1.0
     n = math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2])
-    s = sign * (2.0 if n < 1e-12 else 2.0 * math.atan2(n, sign * q[3]) / n)
+    s = sign * (2.0 if n < 1e-12 else 2.0 * angle_of(n, sign * q[3]) / n)
     return (s * q[0], s * q[1], s * q[2])
 
 
 @compiled
 def rotation_x(angle: float) -> Quaternion:
     """Rotation about x."""
-    return (math.sin(0.5 * angle), 0.0, 0.0, math.cos(0.5 * angle))
+    s, c = sine_cosine(0.5 * angle)
+    return (s, 0.0, 0.0, c)
 
 
 @compiled
 def rotation_y(angle: float) -> Quaternion:
     """Rotation about y."""
-    return (0.0, math.sin(0.5 * angle), 0.0, math.cos(0.5 * angle))
+    s, c = sine_cosine(0.5 * angle)
+    return (0.0, s, 0.0, c)
 
 
 @compiled
 def twist_y(q: Quaternion) -> float:
     """Angle [rad] in (-pi, pi] of the twist about y in the decomposition q = swing * twist."""
-    return wrap(2.0 * math.atan2(q[1], q[3]))
+    return wrap(2.0 * angle_of(q[1], q[3]))
 
 
 @compiled
@@ -185,13 +229,12 @@ def swing_y(q: Quaternion) -> Quaternion:
 @compiled
 def between(a: Vector, b: Vector) -> Quaternion:
     """Shortest rotation from the unit vector a to the unit vector b; half a turn about some normal if opposite."""
-    w = 1.0 + dot(a, b)
-    if w < 1e-9:
+    w, c = 1.0 + dot(a, b), cross(a, b)
+    if w * w + dot(c, c) < 1e-20:
         helper = X if abs(a[0]) < 0.6 else Y
         n = cross(a, helper)
         n = scale(1.0 / norm(n), n)
         return (n[0], n[1], n[2], 0.0)
-    c = cross(a, b)
     return normalized((c[0], c[1], c[2], w))
 
 

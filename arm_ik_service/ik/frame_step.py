@@ -1,6 +1,7 @@
 """One frame of one arm: from where it was, to the new target, with the elbow drawn to where it is comfortable.
 
-1. The elbow's swivel turns towards comfort, at most as fast as a stated bound.
+1. The arm goes on as the hand was pulled last, its elbow turns towards comfort, at most as fast as a stated bound, and
+   flexes as far as the target's distance says.
 2. `converge` brings the hand onto the target.
 3. A target that limits or reach forbid: the position first. The loop goes on from where it stopped with the rotation
    weighing a hundred times less.
@@ -16,19 +17,43 @@ from __future__ import annotations
 
 import math
 
+from arm_ik_service.arm import tangent
 from arm_ik_service.arm.chain import Columns, columns_of, wrist_at
-from arm_ik_service.arm.limits import clamp_swing, clamp_twist
-from arm_ik_service.compiled import Record, compiled
-from arm_ik_service.geometry.scalar import Vector, clip, exp, multiply, norm, scale, subtract, wrap
+from arm_ik_service.arm.configuration import (
+    integrate,
+    read_configuration,
+    store_configuration,
+)
+from arm_ik_service.arm.tangent import Tangent
+from arm_ik_service.compiled import Record, compiled, inlined
+from arm_ik_service.geometry.scalar import Vector, clip, components, norm, scale, subtract, wrap
+from arm_ik_service.geometry.trigonometry import angle_of
 from arm_ik_service.ik.clock import monotonic_ns
-from arm_ik_service.ik.comfort import discomfort, learn_habit, slope_and_curvature
+from arm_ik_service.ik.comfort import discomfort, learn_habit
 from arm_ik_service.ik.conjugate import NEAREST, OUT_OF_TIME, SOLVED, converge
-from arm_ik_service.ik.swivel import Reach, elbow_swivel, posture_at, reach_to, swivel_of, take, violation
+from arm_ik_service.ik.held import rests, walls_at
+from arm_ik_service.ik.jacobian import (
+    NO_WRENCH,
+    read_wrench,
+    store_wrench,
+)
+from arm_ik_service.ik.swivel import (
+    Reach,
+    elbow_side,
+    elbow_swivel,
+    posture_at,
+    reach_to,
+    side_at,
+    swivel_of,
+    take,
+    violation,
+)
 
 SEEDS = 24  # swivels looked at when there is no good start: every 15 degrees
 FLAT = 0.3  # curvature below which discomfort counts as flat: Newton's step would be too long
 GIVE_TIME_S = 0.3  # in which the carrying angle and the wrist's axial play come back to zero
 HALF_SURE = 1.0  # curvature at which the elbow's confidence is one half
+STEADY = 8  # frames without a limit before a motion is carried on: one that leaves a limit is not the one that came
 STUCK_M = 5e-3  # a position missed by more than this is worth a jump of the elbow
 STUCK_RAD = 0.26  # a hand turned further off than this (15 degrees) is worth the elbow's way to another swivel
 ESCAPE_HASTE = 2.0  # times swivel_speed_rad_s on that way
@@ -41,13 +66,13 @@ _ROOM = 0.1  # [rad] to the limits, wanted of the second other start
 _BETTER = 0.5  # a new start must at least halve the error: no alternation between two that are as good
 
 
-@compiled
-def turn_to_comfort(arm: Record, settings: Record, reach: Reach, rotation: Columns, dt_s: float) -> None:
+@inlined
+def towards_comfort(arm: Record, settings: Record, reach: Reach, rotation: Columns, dt_s: float) -> Tangent:
     """Swing the arm about the line from shoulder to wrist towards less discomfort, within the speed bound."""
     chain, q = arm.chain, arm.configuration
-    shoulder = (q[0], q[1], q[2], q[3])
-    swivel = swivel_of(reach, columns_of(shoulder))
-    slope, curvature = slope_and_curvature(arm.comfort, arm.habit, chain, reach, rotation, swivel)
+    upper_arm = columns_of((q[0], q[1], q[2], q[3]))
+    side = elbow_side(reach, upper_arm)
+    _, slope, curvature = discomfort(arm.comfort, arm.habit, chain, reach, rotation, side)
     arm.elbow_confidence = max(curvature, 0.0) / (max(curvature, 0.0) + HALF_SURE)
     # A critically damped follower, so that the swivel's speed is continuous and its lag is swivel_time_s.
     away = -slope / max(abs(curvature), FLAT)
@@ -57,15 +82,9 @@ def turn_to_comfort(arm: Record, settings: Record, reach: Reach, rotation: Colum
     speed = clip(speed, arm.swivel_speed - gain, arm.swivel_speed + gain)
     speed = clip(speed, -settings.swivel_speed_rad_s, settings.swivel_speed_rad_s)
     arm.swivel_speed = speed
-    turn = speed * dt_s
-    shoulder = multiply(exp(scale(turn, reach[0][0])), shoulder)
-    shoulder = clamp_swing(chain, shoulder, columns_of(shoulder))
-    shoulder = clamp_twist(chain, shoulder, columns_of(shoulder))
-    for i in range(4):
-        q[i] = shoulder[i]
     back = dt_s / (dt_s + GIVE_TIME_S)
-    q[5] = clip(q[5] * (1.0 - back), chain.lower[1], chain.upper[1])
-    q[9] = clip(q[9] * (1.0 - back), chain.lower[5], chain.upper[5])
+    swing = scale(speed * dt_s, components(upper_arm, reach[0][0]))
+    return swing, (0.0, -back * q[5], 0.0), (0.0, 0.0, -back * q[9])
 
 
 @compiled
@@ -74,7 +93,7 @@ def most_comfortable(arm: Record, reach: Reach, rotation: Columns) -> float:
     best, least = 0.0, math.inf
     for i in range(SEEDS):
         swivel = (i - SEEDS // 2) * (2.0 * math.pi / SEEDS)
-        cost = discomfort(arm.comfort, arm.habit, arm.chain, posture_at(reach, rotation, swivel))
+        cost = discomfort(arm.comfort, arm.habit, arm.chain, reach, rotation, side_at(reach, swivel))[0]
         if cost < least:
             best, least = swivel, cost
     return best
@@ -94,7 +113,7 @@ def nearest_possible(
     return best
 
 
-@compiled
+@inlined
 def _converge(
     arm: Record, settings: Record, position: Vector, rotation: Columns, budget: int, share: float, deadline: int
 ) -> int:
@@ -113,26 +132,24 @@ def _converge(
     )
 
 
-@compiled
+@inlined
 def _deadline(settings: Record) -> int:
     return monotonic_ns() + int(1e3 * settings.time_limit_us) if settings.time_limit_us > 0.0 else 0
 
 
-@compiled
+@inlined
 def nearest_with_room(chain: Record, position: Vector) -> Vector:
     """Return the wrist position itself, or the nearest that a fully bent elbow leaves room for.
 
     In the hole around the shoulder nothing tells one posture from another: a hand that crosses it threw the arm about.
     """
-    upper, lower = chain.upper_arm_m, chain.forearm_m
-    nearest = math.sqrt(upper * upper + lower * lower + 2.0 * upper * lower * math.cos(chain.upper[0]))
-    distance = norm(position)
+    nearest, distance = chain.nearest_m, norm(position)
     if distance >= nearest:
         return position
     return scale(nearest / distance, position) if distance > 1e-6 else (0.0, -nearest, 0.0)
 
 
-@compiled
+@inlined
 def report_error(arm: Record, asked: Vector, position: Vector) -> None:
     """Leave in `arm` how far the hand is from what was asked, where `position` was granted instead."""
     arm.position_error_m, arm.orientation_error_rad = arm.work.position_error_m, arm.work.orientation_error_rad
@@ -146,7 +163,8 @@ def find_target(arm: Record, settings: Record, asked: Vector, rotation: Columns)
     """Meet one target by itself from the configuration at hand: other starts are as good as the one given."""
     position = nearest_with_room(arm.chain, asked)
     reach = reach_to(arm.chain, position)
-    arm.restarted, arm.escape = 0, 0.0
+    arm.restarted, arm.escape, arm.steady = 0, 0.0, 0
+    store_wrench(arm.work.pull, NO_WRENCH)
     work, budget, deadline = arm.work, settings.iterations, _deadline(settings)
     status = _converge(arm, settings, position, rotation, _first_share(budget), 1.0, deadline)
     used = work.iterations
@@ -216,7 +234,7 @@ def reach_with_any_rotation(
         POSITION_ALONE * settings.rotation_weight_m * settings.rotation_weight_m,
         settings.position_tolerance_m,
         2.0 * math.pi,
-        0,
+        _deadline(settings),
     )
     used += work.iterations
     if work.position_error_m > max(STUCK_M, position_error):
@@ -249,13 +267,13 @@ def escape(arm: Record, settings: Record, position: Vector, rotation: Columns, r
     work.iterations, arm.status = used, status
 
 
-@compiled
+@inlined
 def _first_share(budget: int) -> int:
     """Iterations before anything but the plain loop is tried."""
     return (2 * budget + 2) // 3
 
 
-@compiled
+@inlined
 def _finished(status: int) -> bool:
     return status in (SOLVED, OUT_OF_TIME)
 
@@ -315,6 +333,29 @@ def hold_elbow(arm: Record, settings: Record, position: Vector, rotation: Column
     arm.work.iterations = reach_with_any_rotation(arm, settings, position, rotation, reach, swivel, arm.work.iterations)
 
 
+@inlined
+def carry_on(arm: Record, towards_comfort: Tangent, dt_s: float) -> None:
+    """Move the elbow towards comfort, and pull the hand on as it was pulled last.
+
+    What is left to solve is by how much the hand has sped up or slowed down. The wrench is carried on, not the joints'
+    motion: that would keep the elbow swinging with nothing to stop it. Not into a limit: at the end of the elbow's
+    extension nothing would tell the loop the way back.
+    """
+    chain, work = arm.chain, arm.work
+    start = read_configuration(arm.configuration)
+    if arm.steady >= STEADY:
+        share = dt_s / arm.frame_s
+        onward = tangent.scale(share, tangent.read(work.onward))
+        q = integrate(chain, start, tangent.add(onward, towards_comfort))
+        if not rests(walls_at(chain, q, columns_of(q[0]))):
+            force, moment = read_wrench(work.pull)
+            store_wrench(work.pull, (scale(share, force), scale(share, moment)))
+            store_configuration(arm.configuration, q)
+            return
+    store_wrench(work.pull, NO_WRENCH)
+    store_configuration(arm.configuration, integrate(chain, start, towards_comfort))
+
+
 @compiled
 def step_frame(arm: Record, settings: Record, asked: Vector, rotation: Columns, dt_s: float) -> None:
     """Take one frame: position and rotation asked of the hand bone, right arm, ISB axes."""
@@ -325,11 +366,17 @@ def step_frame(arm: Record, settings: Record, asked: Vector, rotation: Columns, 
     if arm.escape != 0.0:
         escape(arm, settings, position, rotation, reach, dt_s)
     else:
+        swivel = tangent.STILL
         if arm.work.position_error_m <= STUCK_M:
-            turn_to_comfort(arm, settings, reach, rotation, dt_s)
+            swivel = towards_comfort(arm, settings, reach, rotation, dt_s)
         else:  # a hand that cannot be met leaves no swivel free
             arm.swivel_speed = 0.0
+        carry_on(arm, swivel, dt_s)
+        # The target's distance tells the elbow's flexion; a straight arm could not tell the loop the way back.
+        arm.configuration[4] = min(angle_of(reach[3], reach[4]), arm.chain.upper[0])
         follow_target(arm, settings, position, rotation, reach)
+        free = arm.status == SOLVED and arm.work.held == 0 and arm.restarted == 0
+        arm.steady, arm.frame_s = arm.steady + 1 if free else 0, dt_s
     hold_elbow(arm, settings, position, rotation, reach)
     report_error(arm, asked, position)
     learn_habit(arm.habit, arm.configuration, dt_s)

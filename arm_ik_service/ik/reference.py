@@ -16,10 +16,12 @@ from arm_ik_service.arm.chain import columns_of
 from arm_ik_service.arm.limits import swing_excess, swing_gradient, twist_excess, twist_gradient, twist_of
 from arm_ik_service.arm.model import ArmModel
 from arm_ik_service.geometry.batch import mirror_pose
-from arm_ik_service.ik.conjugate import AT_LIMIT, MAX_STEP, MOBILITY, RETREATS, STATIONARY
+from arm_ik_service.ik.conjugate import MAX_STEP, RETREATS, STATIONARY
+from arm_ik_service.ik.held import AT_LIMIT
+from arm_ik_service.ik.jacobian import MOBILITY
 from arm_ik_service.ik.solver import Array, Solution, Status
 
-_MOBILITY = np.array(MOBILITY)
+_MOBILITY = np.array(MOBILITY).ravel()
 
 
 class PinocchioReference:

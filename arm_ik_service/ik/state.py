@@ -19,11 +19,13 @@ ARM = record_dtype(
         ("comfort", np.float64, (len(COMFORT),)),
         ("work", WORK),
         # memory
-        ("started", np.int64),  # 0: no frame yet; 1: one; 2: two on end with the hand met, without a jump
+        ("started", np.int64),  # 0: no frame yet; else 1 and the frames on end with the hand met at the same limits
         ("before", np.float64, (10,)),  # configuration one frame ago
         ("recent_velocity", np.float64, (9,)),  # mean over the last frame
         ("habit", np.float64, (2,)),  # usual wrist flexion and deviation [rad]
         ("swivel_speed", np.float64),  # [rad/s] of the elbow about the arm's line, for comfort
+        ("frame_s", np.float64),  # how long the last frame was
+        ("steady", np.int64),  # frames on end that the hand was met with no limit in the way
         ("escape", np.float64),  # [rad] swivel still to go to where the hand can be met; 0: none
         ("kept", np.float64, (10,)),  # the best so far while another start is tried
         ("anchor", np.float64, (10,)),  # configuration at the beginning of the frame

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from arm_ik_service.arm import tangent
 from arm_ik_service.arm.angles import isb_shoulder, joint_angles
 from arm_ik_service.arm.chain import (
     bone_from_arm,
@@ -15,16 +16,18 @@ from arm_ik_service.arm.chain import (
     position_to_arm,
     spin_to_arm,
 )
+from arm_ik_service.arm.configuration import difference, integrate, read_configuration, store_configuration
 from arm_ik_service.arm.limits import swing_excess, twist_excess, twist_of
 from arm_ik_service.compiled import Record, compiled
 from arm_ik_service.geometry.scalar import clip, quaternion, scale, store, vector
-from arm_ik_service.ik.conjugate import SOLVED, move
+from arm_ik_service.ik.conjugate import SOLVED
 from arm_ik_service.ik.frame_step import first_frame, step_frame
 from arm_ik_service.ik.state import ARM, initialise_arm
-from arm_ik_service.ik.velocity import ITERATIONS, SPEED_BIT, difference, velocity_from_twist
+from arm_ik_service.ik.velocity import ITERATIONS, SPEED_BIT, velocity_from_twist
 
 RESTS_RAD = 1e-3  # nearer to a limit than this the arm rests on it, for whoever reads the mask
 MAX_AHEAD_S = 0.1  # a constant joint velocity says nothing about later
+MET_FRAMES = 3  # on end that a hand at a limit must be met before its twist is believed to be that of the arm
 MIN_DT_S, MAX_DT_S = 1e-3, 0.1  # a frame's time outside this says nothing about speed
 
 
@@ -62,30 +65,33 @@ def show_ahead(arm: Record, ahead_s: float) -> None:
 @compiled
 def _move_on(arm: Record, settings: Record, linear: Any, angular: Any, dt_s: float) -> None:
     """Find the joint velocity: recent motion carried on, corrected by the hand's twist, scaled to speed limits."""
-    chain, velocity, recent, step = arm.chain, arm.velocity, arm.recent_velocity, arm.work.direction
-    follows = arm.status == SOLVED  # a hand that limits hold back does not move as it is asked to
+    chain, q = arm.chain, read_configuration(arm.configuration)
+    # A hand that limits hold back does not move as it is asked to, nor does an arm that comes upon one or leaves it.
+    limits = limits_at(chain, arm.configuration)
+    met = arm.status == SOLVED and limits == arm.limits & ~SPEED_BIT
+    follows = met and (limits == 0 or arm.started > MET_FRAMES)
+    onward = tangent.STILL
     if arm.started == 0 or arm.restarted == 1:  # a jump is no motion
-        for i in range(9):
-            velocity[i] = 0.0
         arm.started = 1
+        tangent.store(arm.recent_velocity, tangent.STILL)
     else:
-        difference(arm.before, arm.configuration, dt_s, step)
-        # The mean over the last frame is half a frame old: carry it on. Where the hand is held back, calm it.
-        onward = (0.5 if arm.started == 2 else 0.0) if follows else -0.5
-        for i in range(9):
-            velocity[i] = step[i] + onward * (step[i] - recent[i])
-            recent[i] = step[i]
-        arm.started = 2 if follows else 1
+        recent = tangent.scale(1.0 / dt_s, difference(read_configuration(arm.before), q))
+        # The mean over the last frame is half a frame old: carry it on. Where limits meddle, calm it.
+        change = tangent.subtract(recent, tangent.read(arm.recent_velocity))
+        share = (0.5 if arm.started > 1 else 0.0) if follows else -0.5
+        onward = tangent.add(recent, tangent.scale(share, change))
+        tangent.store(arm.recent_velocity, recent)
+        arm.started = min(arm.started, MET_FRAMES) + 1 if met else 1
     lam = settings.rotation_weight_m * settings.rotation_weight_m
-    velocity_from_twist(
-        chain, arm.work, arm.configuration, linear, angular, lam, ITERATIONS if follows else 0, velocity
-    )
+    velocity, _ = velocity_from_twist(chain, q, onward, linear, angular, lam, ITERATIONS if follows else 0)
     share = 1.0
+    rates, most = arm.velocity, chain.speed_limit
+    tangent.store(rates, velocity)
     for i in range(9):
-        share = min(share, chain.speed_limit[i] / max(abs(velocity[i]), 1e-9))
+        share = min(share, most[i] / max(abs(rates[i]), 1e-9))
     for i in range(9):
-        velocity[i] *= share
-    arm.limits = limits_at(chain, arm.configuration) | (SPEED_BIT if share < 1.0 else 0)
+        rates[i] *= share
+    arm.limits = limits | (SPEED_BIT if share < 1.0 else 0)
 
 
 @compiled
@@ -121,9 +127,8 @@ def _show(arm: Record) -> None:
 @compiled
 def predict(arm: Record, ahead_s: float, configuration: Any) -> None:
     """Write the configuration (10,) that the arm's velocity leads to in `ahead_s`, inside the limits."""
-    for i in range(10):
-        configuration[i] = arm.configuration[i]
-    move(arm.chain, configuration, arm.velocity, ahead_s)
+    motion = tangent.scale(ahead_s, tangent.read(arm.velocity))
+    store_configuration(configuration, integrate(arm.chain, read_configuration(arm.configuration), motion))
 
 
 __all__ = ["ARM", "initialise_arm", "limits_at", "predict", "show_ahead", "step_arm"]

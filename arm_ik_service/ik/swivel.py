@@ -14,14 +14,16 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from arm_ik_service.arm.chain import Columns, columns_of, turn
-from arm_ik_service.arm.limits import clamp_swing, clamp_twist, swing_excess, twist_excess, twist_of
-from arm_ik_service.compiled import Record, compiled
-from arm_ik_service.geometry.scalar import Vector, clip, cross, dot, from_columns, norm, scale, subtract
+from arm_ik_service.arm.chain import Columns
+from arm_ik_service.arm.limits import clamp_shoulder, swing_excess, twist_excess, twist_of
+from arm_ik_service.compiled import Record, compiled, inlined
+from arm_ik_service.geometry.scalar import Vector, add, clip, cross, dot, from_columns, norm, scale, subtract
+from arm_ik_service.geometry.trigonometry import angle_of, sine_cosine
 
 NEARLY_STRAIGHT = 0.1  # sine of the angle between upper arm and line of reach below which the elbow says no swivel
 
-Reach = tuple[Columns, float, float, float]  # line to the wrist with two normals, elbow along and off it, flexion
+# the line to the wrist with two normals, the elbow along it and off it in upper arms, sine and cosine of its flexion
+Reach = tuple[Columns, float, float, float, float]
 Posture = tuple[Columns, float, float, float, float]  # upper arm; elbow flexion, pronation, wrist flexion, deviation
 
 
@@ -38,14 +40,14 @@ def reach_to(chain: Record, position: Vector) -> Reach:
     distance = clip(wanted, abs(upper - lower) + 1e-6, upper + lower)
     along = (upper * upper + distance * distance - lower * lower) / (2.0 * distance)
     off = math.sqrt(max(0.0, upper * upper - along * along))
-    bend = (distance * distance - upper * upper - lower * lower) / (2.0 * upper * lower)
-    return (axis, low, cross(axis, low)), along / upper, off / upper, math.acos(clip(bend, -1.0, 1.0))
+    cosine = clip((distance * distance - upper * upper - lower * lower) / (2.0 * upper * lower), -1.0, 1.0)
+    return (axis, low, cross(axis, low)), along / upper, off / upper, math.sqrt(1.0 - cosine * cosine), cosine
 
 
 @compiled
 def swivel_of(reach: Reach, upper_arm: Columns) -> float:
     """Swivel of an upper arm about the line of `reach`."""
-    return math.atan2(dot(upper_arm[2], reach[0][1]), -dot(upper_arm[2], reach[0][2]))
+    return angle_of(dot(upper_arm[2], reach[0][1]), -dot(upper_arm[2], reach[0][2]))
 
 
 @compiled
@@ -54,25 +56,53 @@ def elbow_swivel(reach: Reach, upper_arm: Columns) -> float:
     out, aside = -dot(upper_arm[1], reach[0][1]), -dot(upper_arm[1], reach[0][2])
     if out * out + aside * aside < NEARLY_STRAIGHT * NEARLY_STRAIGHT:
         return swivel_of(reach, upper_arm)
-    return math.atan2(aside, out)
+    return angle_of(aside, out)
+
+
+@inlined
+def elbow_side(reach: Reach, upper_arm: Columns) -> Vector:
+    """Direction [unit] from the line of `reach` to the elbow, at the swivel of an upper arm."""
+    side = cross(reach[0][0], upper_arm[2])
+    length = norm(side)
+    return scale(1.0 / length, side) if length > 1e-9 else reach[0][1]
+
+
+@inlined
+def side_at(reach: Reach, swivel: float) -> Vector:
+    """Direction [unit] from the line of `reach` to the elbow, at a swivel."""
+    s, c = sine_cosine(swivel)
+    return add(scale(c, reach[0][1]), scale(s, reach[0][2]))
+
+
+@inlined
+def bones_at(reach: Reach, side: Vector) -> tuple[Columns, Columns]:
+    """Upper arm, and forearm before pronation, with the elbow on a side of the line."""
+    (axis, _, _), along, off, sine, cosine = reach
+    y = subtract(scale(-along, axis), scale(off, side))
+    z = cross(side, axis)
+    x = cross(y, z)
+    return (x, y, z), (add(scale(cosine, x), scale(sine, y)), subtract(scale(cosine, y), scale(sine, x)), z)
 
 
 @compiled
 def posture_at(reach: Reach, rotation: Columns, swivel: float) -> Posture:
     """The arm whose wrist is where `reach` says and whose hand bone has `rotation`; angles not held to any range."""
-    (axis, low, side), along, off, flexion = reach
-    c, s = math.cos(swivel), math.sin(swivel)
-    out = (c * low[0] + s * side[0], c * low[1] + s * side[1], c * low[2] + s * side[2])
-    y = (-along * axis[0] - off * out[0], -along * axis[1] - off * out[1], -along * axis[2] - off * out[2])
-    z = cross(out, axis)
-    x = cross(y, z)
-    fx, fy = turn(x, y, flexion)
+    upper_arm, (fx, fy, z) = bones_at(reach, side_at(reach, swivel))
     tx, ty, tz = rotation
     sine = clip(dot(fy, tx), -1.0, 1.0)
-    pronation = math.atan2(-dot(z, tx), dot(fx, tx))
-    if pronation < -0.5 * math.pi:
-        pronation += 2.0 * math.pi
-    return (x, y, z), flexion, pronation, math.asin(sine), math.atan2(-dot(fy, tz), dot(fy, ty))
+    return (
+        upper_arm,
+        angle_of(reach[3], reach[4]),
+        from_above(angle_of(-dot(z, tx), dot(fx, tx))),
+        angle_of(sine, math.sqrt(1.0 - sine * sine)),
+        angle_of(-dot(fy, tz), dot(fy, ty)),
+    )
+
+
+@inlined
+def from_above(pronation: float) -> float:
+    """Return a pronation in (-pi, pi] as one in (-pi/2, 3 pi/2]: the range of the joint lies well inside that."""
+    return pronation + 2.0 * math.pi if pronation < -0.5 * math.pi else pronation
 
 
 @compiled
@@ -108,8 +138,7 @@ def violation(chain: Record, posture: Posture, margin: float) -> float:
 def take(chain: Record, posture: Posture, configuration: Any) -> None:
     """Write a posture into a configuration (10,), brought inside all limits."""
     upper_arm, flexion, pronation, wrist_flexion, deviation = posture
-    q = clamp_swing(chain, from_columns(*upper_arm), upper_arm)
-    q = clamp_twist(chain, q, columns_of(q))
+    q = clamp_shoulder(chain, from_columns(*upper_arm))
     for i in range(4):
         configuration[i] = q[i]
     configuration[4] = clip(flexion, chain.lower[0], chain.upper[0])

@@ -188,3 +188,35 @@ def test_the_elbow_of_a_still_hand_moves_no_faster_than_its_bound() -> None:
     settled = solver.track(np.repeat(hand[None], 200, axis=0)).configuration[-1]
     found, wanted = RIGHT.forward(track.configuration[-1])["elbow"][:3], RIGHT.forward(settled)["elbow"][:3]
     assert np.linalg.norm(found - wanted) < 0.01
+
+
+def test_a_hand_that_moves_smoothly_takes_an_iteration_or_two() -> None:
+    quick = [JacobianTranspose(RIGHT).track(random_stream(RIGHT, seed, share=0.5)[1]).iterations for seed in range(5)]
+    assert np.median(quick) <= 2
+
+
+def test_pulling_the_hand_on_does_not_amplify_the_noise_of_a_tracker() -> None:
+    hands = random_stream(RIGHT, 3, share=0.5, most_m_s=1.0)[1]
+    rng = np.random.default_rng(0)
+    noisy = hands.copy()
+    noisy[:, :3] += rng.normal(scale=1e-3, size=(len(hands), 3))
+    noisy[:, 3:] = batch.multiply(noisy[:, 3:], batch.exp(rng.normal(scale=5e-3, size=(len(hands), 3))))
+    solver = JacobianTranspose(RIGHT, position_tolerance_m=2e-5, orientation_tolerance_rad=2e-4)
+    clean, shaken = (solver.track(path) for path in (hands, noisy))
+    assert np.percentile(shaken.position_error_m, 99.0) < 1e-4
+    elbows = [RIGHT.forward(track.configuration)["elbow"][:, :3] for track in (clean, shaken)]
+    trembling = np.std(np.diff(elbows[1] - elbows[0], axis=0)[50:], axis=0)
+    assert (
+        np.linalg.norm(trembling) < 2.0 * np.sqrt(2 * 3) * 1e-3
+    )  # twice what the hand itself trembles from frame to frame
+
+
+def test_a_hand_that_stops_dead_is_met_at_once_and_the_elbow_with_it() -> None:
+    hands = random_stream(RIGHT, 2, share=0.5, frames=200, most_m_s=3.0)[1]
+    path = np.concatenate([hands[:100], np.repeat(hands[99:100], 60, axis=0)])
+    track = JacobianTranspose(RIGHT).track(path)
+    assert track.position_error_m[100:].max() < 5e-4
+    elbow = RIGHT.forward(track.configuration)["elbow"][:, :3]
+    moving, after = (np.linalg.norm(np.diff(elbow[part], axis=0), axis=1) for part in (slice(80, 100), slice(100, 160)))
+    assert after[1:].max() < moving.max()
+    assert after[-1] < 1e-3

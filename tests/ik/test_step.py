@@ -46,7 +46,7 @@ def test_velocity_is_the_derivative_of_the_configuration_on_smooth_motion(side: 
 
 def test_velocity_has_no_spikes_at_limits() -> None:
     checked = 0
-    for seed in range(4):
+    for seed in (*range(4), 8, 20, 26, 27, 29):  # the last five had some
         answer = run(RIGHT, targets_of(random_stream(RIGHT, seed, most_m_s=3.0)[1], DT_S), DT_S)
         truth = central_differences(answer.configuration, DT_S)
         near = np.array([np.nanmax(np.abs(truth[max(0, n - 3) : n + 4]), axis=0) for n in range(len(truth))])

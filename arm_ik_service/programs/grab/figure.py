@@ -7,8 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from arm_ik_service.arm import tangent
 from arm_ik_service.arm.angles import isb_shoulder, joint_angles
 from arm_ik_service.arm.chain import bone_from_arm
+from arm_ik_service.arm.configuration import difference, read_configuration
 from arm_ik_service.arm.model import ArmModel
 from arm_ik_service.body.profile import Profile
 from arm_ik_service.body.shoulders import STERNOCLAVICULAR
@@ -16,7 +18,6 @@ from arm_ik_service.geometry import batch
 from arm_ik_service.geometry import scalar as g
 from arm_ik_service.ik.registry import SolverChoice, make_solver
 from arm_ik_service.ik.step import limits_at
-from arm_ik_service.ik.velocity import difference
 from arm_ik_service.output.message import read_output
 from arm_ik_service.output.record import OUTPUT
 from arm_ik_service.wire.messages import (
@@ -132,7 +133,8 @@ class Figure:
         out.position_error_m = np.linalg.norm(out.hand[:3] - hand[:3])
         out.orientation_error_rad = batch.angle_between(out.hand[3:], hand[3:])
         out.configuration[:] = solution.configuration
-        difference(before, solution.configuration, dt, out.velocity)
+        motion = difference(read_configuration(before), read_configuration(solution.configuration))
+        tangent.store(out.velocity, tangent.scale(1.0 / dt, motion))
         joint_angles(out.configuration, out.velocity, out.angles, out.angle_rates)
         out.isb_singular = isb_shoulder(out.configuration, out.isb)
         out.limits = limits_at(model.chains[0], solution.configuration)
