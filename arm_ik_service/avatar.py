@@ -115,12 +115,17 @@ class Avatars:
             self._memory = self._rows.view(np.uint8)
 
     def reset(self, index: int, profile: Profile) -> None:
-        """Make row `index` a person of this profile at rest. Raises ModelError or ProfileError."""
+        """Make row `index` a person of this profile at rest. Raises ModelError or ProfileError, the row as it was."""
+        models = self._arms(profile)
         row = self._rows[index]
         initialise_tracking(row.tracking)
         initialise_body(row.body, profile)
-        for side, model in enumerate(self._arms(profile)):
+        for side, model in enumerate(models):
             initialise_arm(row.arms[side], model)
+
+    def copy(self, source: int, target: int) -> None:
+        """Make row `target` the person in row `source`, as they are now."""
+        self._rows[target] = self._rows[source]
 
     def resume(self, index: int, state: ArmsState) -> bool:
         """Let the person in row `index`, at rest until now, go on from an answer that another process published.

@@ -13,7 +13,8 @@ from arm_ik_service.compiled import Record, compiled, record_dtype
 from arm_ik_service.geometry import scalar as g
 
 EYES_PER_STATURE = 0.936  # eye height over stature: Drillis & Contini (1966)
-ARM_PER_STATURE = 0.332  # upper arm and forearm, of the same
+# Upper arm and forearm: between the same, 0.332, and the distances between joint centres of de Leva (1996), 0.314.
+ARM_PER_STATURE = 0.324
 UPPER_ARM_PER_ARM = 0.56
 HALF_WIDTH_PER_STATURE = 0.103
 
@@ -22,12 +23,14 @@ EYES_M_S = 0.3  # speed of the estimate at first ...
 EYES_SETTLE_AFTER_S = 5.0  # ... and the time after which it is half of that
 STANDING_EYES_M = (1.3, 2.1)  # lower: seated, or a space without a floor, which says nothing of stature
 
-OVERSTRETCHED = 1.025  # reach over arm length of a stretched arm, the girdle's give included
-OVERSTRETCHED_TIME = 0.004  # share of the time that a hand may be farther away
-LENGTH_PER_S = 0.4  # speed of the estimate, as a part of the length
+# Reach over arm length of a stretched arm from where its shoulder rests: girdle and trunk give the rest. With a
+# shoulder that gives as the service lets it, 1.01 is left.
+OVERSTRETCHED = 1.065
+OVERSTRETCHED_TIME = 0.006  # share of the time that a hand may be farther away
+LENGTH_PER_S = 0.3  # speed of the estimate, as a part of the length
 LENGTH_SETTLES_AFTER_S = 30.0
 OUT_OF_HAND = 1.45  # a hand so many arm lengths away has let go of the controller
-LENGTH_RANGE = (0.96, 1.3)  # of what stature says: people rarely stretch fully, so little is taken away
+LENGTH_RANGE = (0.94, 1.3)  # of what stature says: people rarely stretch fully, so little is taken away
 
 LEARNING = record_dtype(
     [

@@ -84,7 +84,7 @@ def _verify(recording: Session, profile: Profile | None, settings: Settings) -> 
     from dataclasses import asdict
 
     from arm_ik_service.cli.progress import frames_progress
-    from arm_ik_service.programs.offline import verify_session
+    from arm_ik_service.programs.verifier import verify_session
 
     with frames_progress(f"{recording.path.name}: verifying", recording.frame_count) as progress:
         result = verify_session(recording, profile, settings, progress)
@@ -93,5 +93,6 @@ def _verify(recording: Session, profile: Profile | None, settings: Settings) -> 
     elif result.different:
         say(f"{result.different} of {result.compared} answers differ, the first: {result.first_difference}")
     else:
-        say(f"all {result.compared} answers are the same bytes again, times of solving and publishing aside")
+        anew = f", {result.measured_anew} times with a new profile" if result.measured_anew else ""
+        say(f"all {result.compared} answers are the same bytes again{anew}, times of solving and publishing aside")
     return asdict(result)

@@ -27,7 +27,7 @@ from arm_ik_service.io.samples import (
     to_nanoseconds,
     to_tracked_poses,
 )
-from arm_ik_service.io.session import BSOR_MAGIC, DEFAULT_AVATAR, RecordedFrame
+from arm_ik_service.io.session import BSOR_MAGIC, DEFAULT_AVATAR, RecordedFrame, RecordedProfile
 from arm_ik_service.wire.messages import FULLY_TRACKED, VERSION, ArmsState, ControllerFrame, TrackedPose
 
 FRAME = np.dtype(
@@ -139,9 +139,9 @@ class BsorSession:
         """Nothing: a replay holds no answers."""
         return iter(())
 
-    def calibration(self, avatar: str) -> bytes | None:
-        """None: a replay holds no profile."""
-        return None
+    def calibrations(self, avatar: str) -> tuple[RecordedProfile, ...]:
+        """Nothing: a replay holds no profile."""
+        return ()
 
 
 def open_bsor(path: Path) -> BsorSession:

@@ -10,11 +10,12 @@ from pathlib import Path
 from arm_ik_service.errors import SessionError
 from arm_ik_service.io.npz import NpzSessionWriter
 from arm_ik_service.io.recording import RecordingWriter
-from arm_ik_service.io.session import RecordedFrame, Session
+from arm_ik_service.io.session import RecordedFrame, RecordedProfile, Session
 from arm_ik_service.wire.messages import ArmsState
 
 Progress = Callable[[int], None]  # told how many more frames are done
-Messages = Iterator[tuple[int, RecordedFrame | ArmsState]]  # by the time of each
+Profiles = list[tuple[int, tuple[str, RecordedProfile]]]  # with their avatars, by the time of each
+Messages = Iterator[tuple[int, RecordedFrame | ArmsState | tuple[str, RecordedProfile]]]  # by the time of each
 PROGRESS_EVERY = 512  # frames
 
 
@@ -44,17 +45,32 @@ def _to_mcap(session: Session, output: Path, avatar: str | None, progress: Progr
     recorded_answers = (answer for answer in session.arms() if avatar in (None, answer.avatar))
     answers: Messages = ((answer.publish_time_ns, answer) for answer in recorded_answers)
     with RecordingWriter(output, {"source": session.path.name, **metadata}) as writer:
-        for time_ns, message in merge(frames, answers, key=itemgetter(0)):
-            if writer.message_count == 0:
-                for name in session.avatars if avatar is None else (avatar,):
-                    if (profile := session.calibration(name)) is not None:
-                        writer.write_calibration(name, profile, time_ns)
+        for time_ns, message in _with_profiles(merge(frames, answers, key=itemgetter(0)), _profiles(session, avatar)):
             if isinstance(message, ArmsState):
                 writer.write_arms(message.avatar, message, time_ns)
-            else:
+            elif isinstance(message, RecordedFrame):
                 writer.write_frame(message.avatar, message.frame, time_ns)
                 count += 1
+            else:
+                writer.write_calibration(message[0], message[1].json, time_ns)
     return count
+
+
+def _profiles(session: Session, avatar: str | None) -> Profiles:
+    names = session.avatars if avatar is None else (avatar,)
+    every = [(logged.time_ns, (name, logged)) for name in names for logged in session.calibrations(name)]
+    return sorted(every, key=itemgetter(0))
+
+
+def _with_profiles(messages: Messages, profiles: Profiles) -> Messages:
+    """Put each profile before the first message that is not older: those from before all others where these begin."""
+    place = 0
+    for time_ns, message in messages:
+        while place < len(profiles) and profiles[place][0] <= time_ns:
+            yield time_ns, profiles[place][1]
+            place += 1
+        yield time_ns, message
+    yield from profiles[place:]
 
 
 def _to_npz(session: Session, output: Path, avatar: str | None, progress: Progress | None) -> int:

@@ -19,7 +19,7 @@ import numpy as np
 from arm_ik_service.errors import SessionError, WireError
 from arm_ik_service.io.columns import BLOCK, Archive, Column, Table
 from arm_ik_service.io.samples import clean_poses, to_nanoseconds, to_tracked_poses
-from arm_ik_service.io.session import DEFAULT_AVATAR, RecordedFrame
+from arm_ik_service.io.session import DEFAULT_AVATAR, RecordedFrame, RecordedProfile
 from arm_ik_service.wire.keys import check_id
 from arm_ik_service.wire.messages import VERSION, ArmsState, ControllerFrame, Space, TrackedPose, Vector
 
@@ -75,9 +75,9 @@ class NpzSession:
         """Nothing: these files hold no answers."""
         return iter(())
 
-    def calibration(self, avatar: str) -> bytes | None:
-        """None: these files hold no profile."""
-        return None
+    def calibrations(self, avatar: str) -> tuple[RecordedProfile, ...]:
+        """Nothing: these files hold no profile."""
+        return ()
 
 
 def _integers(rows: Any, lowest: int = -FARTHEST) -> list[int]:

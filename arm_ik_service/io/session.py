@@ -7,7 +7,8 @@ read is there, and `warnings` says at which byte it ends; only a file that gives
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections import defaultdict, deque
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
@@ -29,6 +30,13 @@ class RecordedFrame(NamedTuple):
     avatar: str
     frame: ControllerFrame
     receive_time_ns: int | None  # None: the file does not say; the sample time is then the best guess
+
+
+class RecordedProfile(NamedTuple):
+    """One calibration profile as it was recorded."""
+
+    time_ns: int  # of the log: the service took it over at some frame around then
+    json: bytes
 
 
 class Session(Protocol):
@@ -64,8 +72,8 @@ class Session(Protocol):
     def arms(self) -> Iterator[ArmsState]:
         """Read the recorded answers in order; empty where the file has none."""
 
-    def calibration(self, avatar: str) -> bytes | None:
-        """Return the last recorded calibration profile of an avatar as JSON, or None."""
+    def calibrations(self, avatar: str) -> Sequence[RecordedProfile]:
+        """Return the calibration profiles that were recorded of an avatar, by time; empty where there are none."""
 
 
 def open_session(path: Path) -> Session:
@@ -98,19 +106,26 @@ def open_session(path: Path) -> Session:
     )
 
 
-def as_served(session: Session) -> Iterator[RecordedFrame]:
-    """Read those frames that a service answered, with the receive times that it stamped on its answers.
+def answered_frames(session: Session) -> Iterator[tuple[RecordedFrame | None, ArmsState]]:
+    """Read every answer with the frame that it answers, received when the service's stamp says; None: not recorded.
 
-    Solving these offline gives the recorded answers again. A frame that a newer one overtook has no answer and is left
-    out. Memory: one small entry for each answer.
+    In the order of the answers, which is that in which they were solved: solving these frames gives the recorded
+    answers again. Memory: each frame that has no answer, because a newer one overtook it; all frames where an answer
+    has none.
     """
-    received: dict[tuple[str, int, int], int] = {}
+    frames = session.frames()
+    waiting: dict[tuple[str, int, int], deque[RecordedFrame]] = defaultdict(deque)
     for arms in session.arms():
-        received[arms.avatar, arms.seq, arms.sample_time_ns] = arms.receive_time_ns
-    for recorded in session.frames():
-        key = (recorded.avatar, recorded.frame.seq, recorded.frame.sample_time_ns)
-        if (time := received.pop(key, None)) is not None:
-            yield recorded._replace(receive_time_ns=time)
+        key = (arms.avatar, arms.seq, arms.sample_time_ns)
+        while key not in waiting and (recorded := next(frames, None)) is not None:
+            waiting[recorded.avatar, recorded.frame.seq, recorded.frame.sample_time_ns].append(recorded)
+        if key not in waiting:
+            yield None, arms
+            continue
+        same = waiting[key]  # more than one where a recording was played twice
+        yield same.popleft()._replace(receive_time_ns=arms.receive_time_ns), arms
+        if not same:
+            del waiting[key]
 
 
 def _first_bytes(path: Path) -> bytes:

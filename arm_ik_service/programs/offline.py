@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 
@@ -13,10 +12,11 @@ from arm_ik_service.avatar import Avatars
 from arm_ik_service.body.profile import Profile
 from arm_ik_service.errors import SessionError
 from arm_ik_service.io.recording import RecordingWriter
-from arm_ik_service.io.session import RecordedFrame, Session, as_served
+from arm_ik_service.io.session import RecordedFrame, Session
 from arm_ik_service.io.solution import SolutionWriter
 from arm_ik_service.settings import Settings
 from arm_ik_service.tracking.state import ACCEPTED
+from arm_ik_service.wire.codec import encode
 from arm_ik_service.wire.messages import ArmsState
 
 BATCH = 256  # frames solved by one call: enough to make the call's own cost vanish
@@ -26,11 +26,10 @@ Progress = Callable[[int], None]
 
 
 def profile_in(session: Session) -> Profile | None:
-    """Return the profile a recorded service used, if the recording holds one."""
+    """Return the profile that a recorded service used in the end, if the recording holds one."""
     for avatar in session.avatars:
-        calibration = session.calibration(avatar)
-        if calibration is not None:
-            return msgspec.json.decode(calibration, type=Profile)
+        if logged := session.calibrations(avatar):
+            return msgspec.json.decode(logged[-1].json, type=Profile)
     return None
 
 
@@ -90,8 +89,12 @@ def save_solution(
     """Write answers as arrays (`.npz`) or as a recording (`.mcap`); returns how many. Raises SessionError."""
     count = 0
     if output.suffix == ".mcap":
+        described: set[str] = set()
         with RecordingWriter(output) as writer:
             for recorded, answer in answers:
+                if recorded.avatar not in described:
+                    described.add(recorded.avatar)
+                    writer.write_calibration(recorded.avatar, encode(profile, "json"), answer.receive_time_ns)
                 writer.write_frame(recorded.avatar, recorded.frame, answer.receive_time_ns)
                 writer.write_arms(recorded.avatar, answer, answer.receive_time_ns)
                 count += 1
@@ -104,39 +107,3 @@ def save_solution(
         arrays.write(answer)
     arrays.save(output)
     return len(arrays)
-
-
-@dataclass
-class Verification:
-    """How a recording's answers compare with solving its frames again."""
-
-    compared: int = 0
-    different: int = 0
-    first_difference: str | None = None
-    unanswered: int = 0  # recorded answers whose frame is not in the recording
-
-
-def without_clock(state: ArmsState) -> ArmsState:
-    """Return the message without the two times that only a running service can measure."""
-    return msgspec.structs.replace(state, solve_time_ns=0, publish_time_ns=0)
-
-
-def verify_session(
-    session: Session, profile: Profile | None, settings: Settings, progress: Progress | None = None
-) -> Verification:
-    """Solve what the service accepted, at the receive times it stamped, and compare every byte it published.
-
-    The recording has to begin with the avatar's first frame: what the arm does depends on what it did.
-    """
-    result = Verification()
-    used = profile_for(session, profile)
-    for avatar in session.avatars:
-        published = (state for state in session.arms() if state.avatar == avatar)
-        served = (recorded for recorded in as_served(session) if recorded.avatar == avatar)
-        for (_, again), recorded in zip(solve_frames(served, used, settings, progress), published, strict=False):
-            result.compared += 1
-            if msgspec.msgpack.encode(without_clock(recorded)) != msgspec.msgpack.encode(again):
-                result.different += 1
-                result.first_difference = result.first_difference or f"avatar {avatar}, seq {again.seq}"
-        result.unanswered += sum(1 for _ in published)
-    return result

@@ -315,7 +315,6 @@ class Service:
                 self._avatars.reset(seat.index, profile)
             except (ModelError, ProfileError) as error:
                 self._tally.refused("calibration", f"{avatar}: {error}", seat)
-                self._avatars.reset(seat.index, seat.profile)
                 return
             seat.profile = profile
             log.info("avatar %s: measured anew", avatar)

@@ -34,9 +34,15 @@ def turns(x: Array, y: Array, z: Array) -> Array:
 
 
 def arm(
-    rng: np.random.Generator, t: Array, upper_arm: float, forearm: float, shoulder: npt.ArrayLike, grip: Array
+    rng: np.random.Generator,
+    t: Array,
+    upper_arm: float,
+    forearm: float,
+    shoulder: npt.ArrayLike,
+    grip: Array,
+    flick: float = 1.0,
 ) -> Array:
-    """Grip poses (N, 7) of a right arm that moves about its shoulder."""
+    """Grip poses (N, 7) of a right arm that moves about its shoulder; its wrist bends by 25 degrees times `flick`."""
     abduction, flexion, bend, roll = sway(rng, t, [5, -30, 0, -60], [80, 120, 110, 60]).T
     chest_from_upper = turns(flexion, -0.3 * abduction, abduction)
     elbow = np.asarray(shoulder) + batch.rotate(chest_from_upper, [0.0, -upper_arm, 0.0])
@@ -45,12 +51,12 @@ def arm(
     # the wrist frame of a straight wrist has its -z along the forearm; then it bends
     hand = batch.multiply(chest_from_fore, batch.exp([-0.5 * np.pi, 0.0, 0.0]))
     hand = batch.multiply(hand, batch.exp(np.stack([0 * roll, 0 * roll, roll], axis=1)))
-    bent = sway(rng, t, [-25, -15, -1], [25, 15, 1])
+    bent = flick * sway(rng, t, [-25, -15, -1], [25, 15, 1])
     wrist = np.concatenate([elbow + forearm * down, batch.multiply(hand, batch.exp(bent))], axis=1)
     return batch.compose(wrist, grip)
 
 
-def lively(seconds: float, body: BodyMeasures, grip: Array = DEFAULT_GRIP, seed: int = 0) -> Take:
+def lively(seconds: float, body: BodyMeasures, grip: Array = DEFAULT_GRIP, seed: int = 0, flick: float = 1.0) -> Take:
     """Return someone of these measures who stands and moves both arms about; left grips are mirrored."""
     rng = np.random.default_rng(seed)
     take = standing(seconds, 60.0)
@@ -59,8 +65,8 @@ def lively(seconds: float, body: BodyMeasures, grip: Array = DEFAULT_GRIP, seed:
     half = 0.5 * body.shoulder_width
     shoulder = np.array([half, eyes - 0.165 * length / 0.56 - 0.26 * half, 0.13 * length / 0.56])
     take.poses[:, HEAD, 1] = eyes
-    take.poses[:, RIGHT] = arm(rng, take.t, body.upper_arm, body.forearm, shoulder, grip)
-    take.poses[:, LEFT] = batch.mirror_pose(arm(rng, take.t, body.upper_arm, body.forearm, shoulder, grip))
+    take.poses[:, RIGHT] = arm(rng, take.t, body.upper_arm, body.forearm, shoulder, grip, flick)
+    take.poses[:, LEFT] = batch.mirror_pose(arm(rng, take.t, body.upper_arm, body.forearm, shoulder, grip, flick))
     return take
 
 
@@ -96,6 +102,26 @@ def test_a_controller_held_like_a_sword_is_noticed_and_its_arm_still_measured() 
     assert batch.angle_between(held.right.orientation_xyzw, sword[3:]) < np.radians(30.0)
     mirrored = batch.mirror_pose(np.array([*held.right.position_m, *held.right.orientation_xyzw]))
     assert batch.angle_between(mirrored[3:], held.left.orientation_xyzw) < 1e-3
+
+
+@pytest.mark.parametrize("stature", [1.5, 1.62, 1.75, 1.88, 2.0])
+@pytest.mark.parametrize("flick", [0.0, 1.0, 2.5])
+def test_whoever_moves_and_however_their_wrists_bend_gets_the_arms_of_a_person(stature: float, flick: float) -> None:
+    body = BodyMeasures(stature_m=stature)
+    found = calibrate(lively(30.0, body, flick=flick, seed=round(100 * stature)).frames, "moving")
+    measured = found.profile.body
+    length_m = measured.upper_arm + measured.forearm
+    assert 1.0 < measured.upper_arm / measured.forearm < 1.4
+    assert abs(length_error(found, body)) < (0.04 if flick <= 1.0 else 0.08)
+    assert abs(length_m - body.upper_arm - body.forearm) < 2.5 * found.arm_length_deviation_m
+
+
+def test_of_someone_who_hardly_shows_anything_little_is_claimed() -> None:
+    body = BodyMeasures(stature_m=1.75)
+    found = calibrate(lively(1.5, body).frames, "moving")
+    sure = calibrate(lively(40.0, body).frames, "moving")
+    assert abs(length_error(found, body)) < 0.1
+    assert found.arm_length_deviation_m > sure.arm_length_deviation_m
 
 
 def test_more_movement_makes_it_surer() -> None:

@@ -17,7 +17,7 @@ from arm_ik_service.cli import app
 from arm_ik_service.errors import SessionError, SettingsError
 from arm_ik_service.exports.dialects import McapDialect
 from arm_ik_service.io.recording import RecordingWriter
-from arm_ik_service.io.session import RecordedFrame, Session, open_session
+from arm_ik_service.io.session import RecordedFrame, RecordedProfile, Session, open_session
 from arm_ik_service.programs.demo import bundled_session
 from arm_ik_service.programs.export_session import export_session
 from arm_ik_service.wire.messages import ArmsState
@@ -126,8 +126,8 @@ class Looped:
     def frames(self) -> Iterator[RecordedFrame]:
         yield from ()
 
-    def calibration(self, avatar: str) -> bytes | None:
-        return None
+    def calibrations(self, avatar: str) -> tuple[RecordedProfile, ...]:
+        return ()
 
 
 @pytest.mark.parametrize(

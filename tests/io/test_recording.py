@@ -21,7 +21,7 @@ from mcap.writer import CompressionType, IndexType, Writer
 
 from arm_ik_service.errors import SessionError
 from arm_ik_service.io.recording import Recording, RecordingWriter
-from arm_ik_service.io.session import as_served, open_session
+from arm_ik_service.io.session import answered_frames, open_session
 from arm_ik_service.wire.keys import Keys
 from arm_ik_service.wire.messages import (
     FULLY_TRACKED,
@@ -88,22 +88,39 @@ def test_answers_skeletons_and_profiles_lie_beside_the_frames(tmp_path: Path) ->
     assert list(session.arms()) == [answer("anna", seq) for seq in range(20)]
     assert session.answer_count == 20
     assert session.skeleton("anna") == people.SKELETON
-    assert json.loads(session.calibration("anna") or b"") == {"body": {"stature_m": 1.7}}
-    assert session.calibration("bert") is None
+    logged = [(profile.time_ns, json.loads(profile.json)) for profile in session.calibrations("anna")]
+    assert logged == [(1, {"body": {"stature_m": 1.6}}), (2, {"body": {"stature_m": 1.7}})]
+    assert session.calibrations("bert") == ()
     assert session.skeleton("bert") is None
 
 
-def test_frames_as_served_are_those_that_were_answered_at_the_times_the_service_stamped(tmp_path: Path) -> None:
+def test_answers_come_with_the_frames_they_answer_at_the_times_the_service_stamped(tmp_path: Path) -> None:
     with RecordingWriter(tmp_path / "a.mcap") as writer:
         for seq in range(30):
             if seq % 5 != 3:  # an answer may even be logged before its frame
                 writer.write_arms("anna", answer("anna", seq), frame(seq).sample_time_ns)
-            writer.write_frame("anna", frame(seq), frame(seq).sample_time_ns + 10)
+            if seq != 7:
+                writer.write_frame("anna", frame(seq), frame(seq).sample_time_ns + 10)
             writer.write_frame("bert", frame(seq), frame(seq).sample_time_ns + 10)
-    served = list(as_served(open_session(tmp_path / "a.mcap")))
-    assert [recorded.frame.seq for recorded in served] == [seq for seq in range(30) if seq % 5 != 3]
-    assert {recorded.avatar for recorded in served} == {"anna"}
-    assert all(r.receive_time_ns == answer("anna", r.frame.seq).receive_time_ns for r in served)
+    pairs = list(answered_frames(open_session(tmp_path / "a.mcap")))
+    assert [arms.seq for _, arms in pairs] == [seq for seq in range(30) if seq % 5 != 3]
+    assert [arms.seq for recorded, arms in pairs if recorded is None] == [7]
+    for recorded, arms in pairs:
+        if recorded is not None:
+            assert (recorded.avatar, recorded.frame) == ("anna", frame(arms.seq))
+            assert recorded.receive_time_ns == answer("anna", arms.seq).receive_time_ns
+
+
+def test_a_recording_of_the_same_motion_played_twice_has_every_answer_with_its_own_frame(tmp_path: Path) -> None:
+    with RecordingWriter(tmp_path / "a.mcap") as writer:
+        for turn in range(2):
+            for seq in range(20):
+                late = msgspec.structs.replace(answer("anna", seq), receive_time_ns=turn * SECOND + seq)
+                writer.write_frame("anna", frame(seq), turn * SECOND + 2 * seq)
+                writer.write_arms("anna", late, turn * SECOND + 2 * seq + 1)
+    pairs = list(answered_frames(open_session(tmp_path / "a.mcap")))
+    received = [recorded.receive_time_ns for recorded, _ in pairs if recorded is not None]
+    assert received == [turn * SECOND + seq for turn in range(2) for seq in range(20)]
 
 
 def test_messages_come_by_the_time_of_the_log_not_in_the_order_of_the_file(tmp_path: Path) -> None:

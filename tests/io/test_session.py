@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from arm_ik_service.errors import SessionError
-from arm_ik_service.io.session import BSOR_MAGIC, MCAP_MAGIC, NPZ_MAGIC, as_served, open_session
+from arm_ik_service.io.session import BSOR_MAGIC, MCAP_MAGIC, NPZ_MAGIC, answered_frames, open_session
 from arm_ik_service.resources import resource_folder
 
 BUNDLED = resource_folder("replay_logs")
@@ -75,4 +75,4 @@ def test_random_bytes_raise_a_session_error_and_nothing_else(
 
 
 def test_a_recording_without_answers_has_served_nobody() -> None:
-    assert list(as_served(open_session(BUNDLED / "boxing.mcap"))) == []
+    assert list(answered_frames(open_session(BUNDLED / "boxing.mcap"))) == []

@@ -11,10 +11,12 @@ from pathlib import Path
 import msgspec
 import numpy as np
 import pytest
-from harness import COMMAND, Running, Service, wait_for
+from harness import COMMAND, KEYS, Running, Service, wait_for
 
 from arm_ik_service.io.recording import RecordingWriter
 from arm_ik_service.io.session import open_session
+from arm_ik_service.io.zenoh_bus import BusOptions, open_client
+from arm_ik_service.io.zenoh_streams import put_once, subscribe
 from arm_ik_service.programs.demo import bundled_session, free_endpoint
 from arm_ik_service.programs.replayer import ReplayOptions, selected
 
@@ -63,6 +65,40 @@ def test_a_replay_is_answered_frame_by_frame_recorded_as_it_was_and_solved_again
     assert solved.returncode == 0, solved.stdout + solved.stderr
     report = json.loads(solved.stdout)
     assert (report["compared"], report["different"], report["unanswered"]) == (len(answers), 0, 0)
+
+
+@pytest.mark.parametrize("jitter_buffer_s", [0.0, 0.05])
+def test_a_person_measured_while_they_are_recorded_is_solved_again_to_the_same_bytes(
+    jitter_buffer_s: float, recording: Path, tmp_path: Path
+) -> None:
+    copy, endpoint = tmp_path / "copy.mcap", free_endpoint()
+    settings = tmp_path / "settings.toml"
+    settings.write_text(f"[service]\njitter_buffer_s = {jitter_buffer_s}\n")
+    connect, settled = ["--connect", endpoint], ["--settings", str(settings)]
+    service = Running("serve", "--listen", endpoint, *settled)
+    service.wait_ready()
+    recorder = Running("record", str(copy), *connect)
+    recorder.wait_ready()
+    with open_client(BusOptions(connect=(endpoint,)), wait_s=10.0) as bus:
+        answered: list[bytes] = []
+        subscribe(bus, KEYS.arms("demo"), lambda _key, payload, _ns: answered.append(payload))
+        player = Running("replay", str(recording), "--to", "6", *connect)
+        for most, stature in ((100, 1.6), (250, 1.9)):
+            deadline_s = time.monotonic() + 30.0
+            while len(answered) < most:
+                assert time.monotonic() < deadline_s
+                time.sleep(0.01)
+            body = {"stature_m": stature, "upper_arm_m": 0.3, "forearm_m": 0.25}
+            put_once(bus, KEYS.calibration("demo"), msgspec.json.encode({"body": body}), "json")
+        assert player.finish() == 0
+        time.sleep(0.2)
+    assert recorder.end(signal.SIGINT) == 0
+    assert service.end() == 0
+    solved = arm_ik("solve", str(copy), "--verify", "--json", *settled)
+    assert solved.returncode == 0, solved.stdout + solved.stderr
+    report = json.loads(solved.stdout)
+    assert (report["different"], report["unanswered"], report["measured_anew"]) == (0, 0, 2)
+    assert report["compared"] > 300
 
 
 def test_killing_every_other_program_leaves_the_service_answering_and_a_log_that_plays(

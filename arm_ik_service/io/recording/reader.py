@@ -9,7 +9,7 @@ from typing import TypeVar
 
 from arm_ik_service.errors import SessionError, WireError
 from arm_ik_service.io.recording.log import Log, LoggedMessage, walk
-from arm_ik_service.io.session import RecordedFrame
+from arm_ik_service.io.session import RecordedFrame, RecordedProfile
 from arm_ik_service.wire import codec
 from arm_ik_service.wire.keys import check_id
 from arm_ik_service.wire.messages import ArmsState, ControllerFrame, Skeleton
@@ -30,6 +30,7 @@ class Recording:
                 self._channels.setdefault(kind, {})[channel] = avatar
         self._refused: Counter[str] = Counter()
         self._first_cause: dict[str, str] = {}
+        self._profiles: dict[str, list[RecordedProfile]] | None = None  # once they are asked for
         frames = self._channels.get("controllers", {})
         self.avatars: tuple[str, ...] = tuple(dict.fromkeys(frames.values()))
         self.frame_count: int = sum(log.counts[channel] for channel in frames)
@@ -67,9 +68,15 @@ class Recording:
             self._refuse(f"the skeleton of {avatar}", error)
             return None
 
-    def calibration(self, avatar: str) -> bytes | None:
-        """Return the last recorded calibration profile of an avatar as JSON, or None."""
-        return self._last("calibration", avatar)
+    def calibrations(self, avatar: str) -> tuple[RecordedProfile, ...]:
+        """Return the calibration profiles that were recorded of an avatar, by time; empty where there are none."""
+        if self._profiles is None:
+            self._profiles = {}
+            avatars = self._channels.get("calibration", {})
+            for message in self._log.messages(frozenset(avatars)) if avatars else ():
+                profile = RecordedProfile(message.log_time_ns, message.data)
+                self._profiles.setdefault(avatars[message.channel], []).append(profile)
+        return tuple(self._profiles.get(avatar, ()))
 
     def _last(self, kind: str, avatar: str) -> bytes | None:
         channels = frozenset(c for c, name in self._channels.get(kind, {}).items() if name == avatar)
