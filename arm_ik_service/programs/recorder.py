@@ -47,6 +47,7 @@ class Recorder:
                 ("controllers", keys.controllers()),
                 ("arms", keys.arms()),
                 ("calibration", keys.calibration()),
+                ("skeleton", keys.skeleton()),
             )
         ]
 
@@ -85,6 +86,8 @@ class Recorder:
                 self._recorded.frames += 1
             elif kind == "calibration":
                 self._writer.write_calibration(avatar, payload, receive_time_ns)
+            elif kind == "skeleton":
+                self._writer.write_skeleton(avatar, payload, receive_time_ns)
             else:
                 self._writer.write_arms(avatar, codec.arms_states.decode(payload), receive_time_ns)
                 self._recorded.answers += 1
@@ -96,7 +99,7 @@ class Recorder:
             self._describe(avatar, receive_time_ns)
 
     def _describe(self, avatar: str, time_ns: int) -> None:
-        """Ask the service for what it does not publish every frame; a service that is gone simply does not answer."""
+        """Ask the service for what it published before we came; a service that is gone simply does not answer."""
         for key, write in (
             (self._keys.skeleton(avatar), self._writer.write_skeleton),
             (self._keys.calibration(avatar), self._writer.write_calibration),
