@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from arm_ik_service.arm.model import ArmModel
-from arm_ik_service.body.profile import Profile
+from arm_ik_service.body.profile import BodyMeasures, Profile
 from arm_ik_service.body.state import BODY
 from arm_ik_service.body.step import initialise_body, step_body
 from arm_ik_service.compiled import compiled, record_dtype
@@ -145,6 +145,17 @@ class Avatars:
             arm["before"] = q
             arm["started"] = 1  # not a first frame: it would choose the elbow afresh
         return True
+
+    def measures(self, index: int, profile: Profile) -> BodyMeasures:
+        """Return the lengths that the person in row `index` is solved with: of their profile, or learnt so far."""
+        body = self._rows[index]["body"]
+        return BodyMeasures(
+            stature_m=float(body["stature"]),
+            upper_arm_m=float(body["upper_arm"]),
+            forearm_m=float(body["forearm"]),
+            hand_m=profile.body.hand_m,
+            shoulder_width_m=2.0 * float(body["half_width"]),
+        )
 
     def _arms(self, profile: Profile) -> tuple[ArmModel, ArmModel]:
         models = self._models.get(profile)

@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 
 from arm_ik_service.arm.model import ANGLES, LIMITS, ArmModel
-from arm_ik_service.body.profile import GripOffset, Profile, RangesOfMotion
+from arm_ik_service.body.profile import BodyMeasures, GripOffset, Profile, RangesOfMotion
 from arm_ik_service.wire.messages import VERSION, JointLimit, Pose, Skeleton, SwingRegion
 
 EDGE_POINTS = 36  # of the swing region: every 10 degrees of azimuth, the edge being a series of four harmonics
@@ -30,9 +30,12 @@ def _pose(offset: GripOffset) -> Pose:
     return Pose(offset.position_m, offset.orientation_xyzw)
 
 
-def skeleton_of(avatar: str, profile: Profile) -> Skeleton:
-    """Describe one avatar. Raises ModelError where the model file cannot be read."""
-    body = profile.body
+def skeleton_of(avatar: str, profile: Profile, measures: BodyMeasures | None = None) -> Skeleton:
+    """Describe one avatar; `measures` are those it has now, where they are learnt and no longer the profile's.
+
+    Raises ModelError where the model file cannot be read.
+    """
+    body = measures or profile.body
     limits, swing = _limits(profile.limits_deg)
     return Skeleton(
         version=VERSION,

@@ -14,7 +14,7 @@ import numpy as np
 from arm_ik_service.avatar import Avatar, Avatars
 from arm_ik_service.bench.people import moving
 from arm_ik_service.bench.processes import wait_for_end
-from arm_ik_service.body.profile import Profile
+from arm_ik_service.body.profile import BodyMeasures, Profile
 from arm_ik_service.io.zenoh_bus import BusOptions, open_hub
 from arm_ik_service.programs.service import BATCH, Service
 from arm_ik_service.settings import ServiceSettings, Settings
@@ -38,6 +38,10 @@ class NoAvatars(Avatars):
     def resume(self, index: int, state: ArmsState) -> bool:
         """There is nobody."""
         return False
+
+    def measures(self, index: int, profile: Profile) -> BodyMeasures:
+        """Nobody learns."""
+        return profile.body
 
     def add(self, index: int, frame: ControllerFrame, receive_time_ns: int, predict_to_ns: int | None = None) -> int:
         """Take a place in the batch."""

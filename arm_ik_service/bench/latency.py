@@ -95,9 +95,9 @@ class Line:
         self.put_ns.append(time.perf_counter_ns())
         self.stream.put(payload)
 
-    def round_trips(self) -> RoundTrips:
-        """What became of the frames after the warm-up."""
-        numbers = range(WARM_UP_FRAMES, len(self.put_ns))
+    def round_trips(self, first: int = WARM_UP_FRAMES) -> RoundTrips:
+        """What became of the frames from the `first` on that counts."""
+        numbers = range(first, len(self.put_ns))
         trips_ms = [(self.come_ns[n] - self.put_ns[n]) / 1e6 for n in numbers if n in self.come_ns]
         if not trips_ms:
             raise ArmIkError("no answer came back: the service or the echo is not reachable")

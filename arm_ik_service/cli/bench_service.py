@@ -11,6 +11,7 @@ from arm_ik_service.cli.bench import bench
 from arm_ik_service.cli.options import Json, say
 
 if TYPE_CHECKING:
+    from arm_ik_service.bench.attached import Attached
     from arm_ik_service.bench.capacity import Step
     from arm_ik_service.bench.load import Measured
 
@@ -24,13 +25,19 @@ def latency(
     rate: Rate = 90.0,
     frames: Annotated[int, typer.Option(min=10, metavar="N", help="Frames to the service, and as many echoes.")] = 2000,
     view: Annotated[bool, typer.Option("--view", help="With a viewer attached, which writes to a file.")] = False,
+    sinks: Annotated[
+        bool, typer.Option("--sinks", help="Instead of an echo: the same service with all of `arm-ik export` attached.")
+    ] = False,
     json_output: Json = False,
 ) -> None:
     """Controllers-in to arms-out of one person, beside a bare Python Zenoh echo of the same sizes.
 
-    Service and echo run as processes; frames and echoes take turns, so that noise falls on both alike.
+    Service and echo run as processes; frames and echoes take turns, so that noise falls on both alike. With --sinks
+    blocks of frames take turns: nobody else, a process that listens and does nothing, and the sinks of all dialects.
 
     Example: [bold]arm-ik bench latency --frames 5000 --view[/bold]
+
+    Example: [bold]arm-ik bench latency --frames 5000 --sinks[/bold]
     """
     import json
     import tempfile
@@ -38,7 +45,13 @@ def latency(
 
     from arm_ik_service.bench.latency import measure_latency
     from arm_ik_service.cli.progress import frames_progress
+    from arm_ik_service.errors import SettingsError
 
+    if sinks:
+        if view:
+            raise SettingsError("--view or --sinks: one at a time tells what each costs")
+        _latency_with_sinks(rate, frames, json_output=json_output)
+        return
     with tempfile.TemporaryDirectory() as folder, frames_progress("bench latency", frames) as advance:
         file = str(Path(folder) / "view.rrd") if view else None
         result = measure_latency(rate_hz=rate, frames=frames, view=file, progress=advance)
@@ -52,6 +65,33 @@ def latency(
     rows.append(("ratio", f"{result.p50_ratio:.2f}", f"{result.p99_ratio:.2f}", "", ""))
     title = f"{result.frame_bytes} bytes in, {result.answer_bytes} out, {rate:g} Hz"
     _print(title + (", with a viewer" if view else ""), ("", "p50 ms", "p99 ms", "max ms", "answered"), rows)
+
+
+BLOCK_S = 10.0  # of one arrangement at a time: the machine's own noise changes more slowly
+
+
+def _latency_with_sinks(rate: float, frames: int, *, json_output: bool) -> None:
+    import json
+
+    from arm_ik_service.bench.attached import ARRANGEMENTS, measure_attached
+    from arm_ik_service.cli.progress import frames_progress
+
+    rounds = max(1, round(frames / (BLOCK_S * rate)))
+    each = frames // rounds
+    with frames_progress("bench latency --sinks", len(ARRANGEMENTS) * rounds * each) as advance:
+        result = measure_attached(rate_hz=rate, frames=each, rounds=rounds, progress=advance)
+    if json_output:
+        typer.echo(json.dumps(result.as_json()))
+        return
+    rows = [_arrangement_row(result, name) for name in ARRANGEMENTS]
+    title = f"{rounds} rounds of {each} frames at {rate:g} Hz: medians of blocks, ratios within a round"
+    _print(title, ("", "p50 ms", "ratio", "p99 ms", "ratio"), rows)
+
+
+def _arrangement_row(result: Attached, name: str) -> tuple[str, ...]:
+    called = {"alone": "nobody else", "listener": "a silent listener", "sinks": "all sinks"}[name]
+    numbers = (result.p50_ms(name), result.p50_ratio(name), result.p99_ms(name), result.p99_ratio(name))
+    return (called, *(f"{number:.3f}" for number in numbers))
 
 
 @bench.command()

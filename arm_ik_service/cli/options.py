@@ -45,7 +45,8 @@ Show = Annotated[
         metavar="WHAT,...",
         help="What else is drawn of each arm: [bold]reach[/bold], the ball around the shoulder that the wrist cannot "
         "leave; [bold]swivel[/bold], the circle on which the elbow can go for this wrist, bright where the shoulder "
-        "lets it; [bold]limits[/bold], the region of the shoulder and a dial for each joint, red where the arm rests "
+        "lets it, in a bracket where it is comfortable; "
+        "[bold]limits[/bold], the region of the shoulder and a dial for each joint, red where the arm rests "
         "on a limit; [bold]ghost[/bold], the hand where the raw target has it; or [bold]all[/bold].",
     ),
 ]

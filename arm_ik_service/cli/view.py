@@ -30,6 +30,9 @@ def view(
     connect_rerun: Annotated[
         str | None, typer.Option("--connect-rerun", metavar="URL", help="Stream to a viewer that runs already.")
     ] = None,
+    record: Annotated[
+        Path | None, typer.Option("--record", metavar="FILE", help="Write frames and arms beside it, .mcap.")
+    ] = None,
     duration_s: Annotated[
         float | None, typer.Option("--duration", metavar="SECONDS", min=0.1, help="Stop after so long.")
     ] = None,
@@ -43,10 +46,14 @@ def view(
     """Show everybody's arms in Rerun, until Ctrl-C. Several outputs may be given together.
 
     Example: [bold]arm-ik view --save session.rrd --web[/bold]
+
+    Example: [bold]arm-ik view --record session.mcap[/bold]
     """
+    from arm_ik_service.errors import SessionError
     from arm_ik_service.io.rerun_view import Connect as ConnectTo
     from arm_ik_service.io.rerun_view import Save, Sink, Spawn, Web
     from arm_ik_service.io.zenoh_bus import open_client
+    from arm_ik_service.programs.recorder import recorded_beside
     from arm_ik_service.programs.viewer import Viewer
     from arm_ik_service.wire.keys import Keys
 
@@ -59,8 +66,10 @@ def view(
         sinks.append(ConnectTo(connect_rerun))
     if spawn or not sinks:
         sinks.append(Spawn())
+    if record is not None and record.exists():
+        raise SessionError(f"{record} exists: choose another name")
     skin, overlays = skin_options(avatar, skinning), show_option(show)
-    with open_client(zenoh, waiting=say) as bus:
+    with open_client(zenoh, waiting=say) as bus, recorded_beside(bus, record, Keys(prefix)) as recorded:
         viewer = Viewer(bus, sinks, Keys(prefix), skin, overlays)
         for sink in sinks:
             if isinstance(sink, Web):
@@ -69,3 +78,5 @@ def view(
             say("ready; Ctrl-C ends it")
             viewer.run(duration_s)
         say(viewer.close())
+    if record is not None:
+        say(f"{record}: {recorded.frames} frames, {recorded.answers} answers")

@@ -36,13 +36,13 @@ def has_listener(stream: Stream) -> bool:
     return bool(getattr(status, "matching", status))
 
 
-def put_once(bus: Bus, key: str, payload: bytes, encoding: Encoding) -> None:
-    """Publish something that does not come again soon: it waits for room rather than be dropped."""
+def put_once(bus: Bus, key: str, payload: bytes, encoding: Encoding, *, waits: bool = True) -> None:
+    """Publish something that does not come again soon: it waits for room rather than be dropped, unless told not to."""
     bus.put(
         key,
         payload,
         encoding=zenoh.Encoding(MEDIA_TYPES[encoding]),
-        congestion_control=zenoh.CongestionControl.BLOCK,
+        congestion_control=zenoh.CongestionControl.BLOCK if waits else zenoh.CongestionControl.DROP,
     )
 
 

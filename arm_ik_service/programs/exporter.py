@@ -1,7 +1,8 @@
-"""Sending live states on in another dialect, in a process of its own: no sink can delay the service.
+"""Sending live states on in other dialects, in a process of its own: no sink can delay the service.
 
-The process gives way to others where processors are scarce, and between Zenoh's thread and the sink lies one slot an
-avatar: a sink that is slow gets the newest state, not a queue.
+The process gives way to others where processors are scarce, and between Zenoh's thread and the sinks lies one slot an
+avatar: sinks that are slow get the newest state, not a queue. One process serves several dialects: the service then
+sends every state once, and this process reads it once.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import os
 import time
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 from threading import Condition
 
@@ -43,20 +45,22 @@ class Exported:
 
 
 class Exporter:
-    """Sends what is published on an open Zenoh session, which the caller closes, to a sink, which is closed with it."""
+    """Sends what is published on an open Zenoh session, which the caller closes, to sinks, which are closed with it."""
 
     def __init__(
         self,
         bus: Bus,
-        sink: Sink,
+        sinks: Sequence[Sink],
         keys: Keys,
         *,
         avatar: str | None = None,
         mirror: bool = False,
         most_hz: float | None = None,
     ) -> None:
-        """`avatar` None: all, or the first who is heard where the sink knows one person only."""
-        self._sink, self._keys, self._avatar, self._mirror = sink, keys, avatar, mirror
+        """`avatar` None: all, or the first who is heard where a sink knows one person only."""
+        self._sinks, self._keys, self._mirror = sinks, keys, mirror
+        self._only = avatar  # whom sinks are told of that know one person only
+        self._many = any(sink.many for sink in sinks)
         self._spacing_s = 0.0 if most_hz is None else 1.0 / most_hz
         self._next_s: dict[str, float] = {}
         self._newest: dict[str, bytes] = {}
@@ -65,7 +69,7 @@ class Exporter:
         self._stopped = False
         self._exported = Exported()
         self._subscribers = [subscribe(bus, keys.arms(avatar or "*"), self._take_arms)]
-        if sink.wants_frames:  # each subscriber costs the service's process a copy of the stream
+        if any(sink.wants_frames for sink in sinks):  # each subscriber costs the service's process a copy of the stream
             self._subscribers.append(subscribe(bus, keys.controllers(avatar or "*"), self._take_frame))
 
     def stop(self) -> None:
@@ -85,7 +89,8 @@ class Exporter:
         finally:
             for subscriber in self._subscribers:
                 subscriber.undeclare()
-            self._sink.close()
+            for sink in self._sinks:
+                sink.close()
         return self._exported
 
     def _take_arms(self, key: str, payload: bytes, _time_ns: int) -> None:
@@ -105,9 +110,8 @@ class Exporter:
         self._frames.setdefault(self._keys.avatar_of(key), deque(maxlen=REMEMBERED)).append(frame)
 
     def _send(self, avatar: str, payload: bytes) -> None:
-        if not self._sink.many and self._avatar is None:
-            self._avatar = avatar
-        if self._avatar not in (None, avatar):
+        self._only = self._only or avatar
+        if not self._many and avatar != self._only:
             return
         now_s = time.monotonic()
         if now_s < self._next_s.get(avatar, 0.0):
@@ -123,7 +127,9 @@ class Exporter:
         frame = self._frame_of(avatar, state)
         if self._mirror:
             state, frame = mirrored(state), None if frame is None else mirrored_frame(frame)
-        self._sink.send(state, frame)
+        for sink in self._sinks:
+            if sink.many or avatar == self._only:
+                sink.send(state, frame if sink.wants_frames else None)
         self._exported.sent += 1
         if avatar not in self._exported.avatars:
             self._exported.avatars += (avatar,)

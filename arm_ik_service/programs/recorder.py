@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from queue import Empty, SimpleQueue
-from threading import Event
+from threading import Event, Thread
 
-from arm_ik_service.errors import WireError
+from arm_ik_service.errors import ArmIkError, WireError
 from arm_ik_service.io.recording import RecordingWriter
 from arm_ik_service.io.zenoh_streams import Bus, query, subscribe
 from arm_ik_service.wire import codec
@@ -39,7 +40,7 @@ class Recorder:
         self._stopped = Event()
         self._queue: SimpleQueue[tuple[str, str, bytes, int]] = SimpleQueue()
         self._described: set[str] = set()
-        self._recorded = Recorded()
+        self.recorded = Recorded()
         self._writer = RecordingWriter(path, keys=keys)
         self._subscribers = [
             subscribe(bus, key, lambda *arrival, kind=kind: self._queue.put((kind, *arrival)))
@@ -47,6 +48,7 @@ class Recorder:
                 ("controllers", keys.controllers()),
                 ("arms", keys.arms()),
                 ("calibration", keys.calibration()),
+                ("skeleton", keys.skeleton()),
             )
         ]
 
@@ -63,7 +65,7 @@ class Recorder:
             for subscriber in self._subscribers:
                 subscriber.undeclare()
             self._drain(wait_s=0.0)
-        return self._recorded
+        return self.recorded
 
     def _drain(self, wait_s: float) -> None:
         try:
@@ -75,31 +77,62 @@ class Recorder:
             pass
         self._writer.flush_if_due()
         if self._progress is not None:
-            self._progress(self._recorded)
+            self._progress(self.recorded)
 
     def _write(self, kind: str, key: str, payload: bytes, receive_time_ns: int) -> None:
         avatar = self._keys.avatar_of(key)
         try:
             if kind == "controllers":
                 self._writer.write_frame(avatar, codec.controller_frames.decode(payload), receive_time_ns)
-                self._recorded.frames += 1
+                self.recorded.frames += 1
             elif kind == "calibration":
                 self._writer.write_calibration(avatar, payload, receive_time_ns)
+            elif kind == "skeleton":
+                self._writer.write_skeleton(avatar, payload, receive_time_ns)
             else:
                 self._writer.write_arms(avatar, codec.arms_states.decode(payload), receive_time_ns)
-                self._recorded.answers += 1
+                self.recorded.answers += 1
         except WireError:
-            self._recorded.refused += 1
+            self.recorded.refused += 1
             return
         if kind == "arms" and avatar not in self._described:
             self._described.add(avatar)
             self._describe(avatar, receive_time_ns)
 
     def _describe(self, avatar: str, time_ns: int) -> None:
-        """Ask the service for what it does not publish every frame; a service that is gone simply does not answer."""
+        """Ask the service for what it published before we came; a service that is gone simply does not answer."""
         for key, write in (
             (self._keys.skeleton(avatar), self._writer.write_skeleton),
             (self._keys.calibration(avatar), self._writer.write_calibration),
         ):
             for _, payload in query(self._bus, key):
                 write(avatar, payload, time_ns)
+
+
+@contextmanager
+def recorded_beside(bus: Bus, path: Path | None, keys: Keys) -> Iterator[Recorded]:
+    """Record for the length of the block, on the session of something else: the service sends both but once.
+
+    Nothing where `path` is None. Raises SessionError, at the end if it is the disk that gives out.
+    """
+    if path is None:
+        yield Recorded()
+        return
+    recorder = Recorder(bus, path, keys)
+    failed: list[ArmIkError] = []
+
+    def run() -> None:
+        try:
+            recorder.run()
+        except ArmIkError as error:
+            failed.append(error)
+
+    worker = Thread(target=run, name="recorder")
+    worker.start()
+    try:
+        yield recorder.recorded
+    finally:
+        recorder.stop()
+        worker.join()
+    if failed:
+        raise failed[0]

@@ -8,10 +8,12 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from arm_ik_service.body.profile import Profile
+from arm_ik_service.body.profile import BodyMeasures, Profile
 from arm_ik_service.io.zenoh_streams import Stream
 from arm_ik_service.wire.codec import MapDecoder
 from arm_ik_service.wire.messages import TRACKING_STATES, AvatarHealth, TrackingState
+
+NOTICEABLE = 0.01  # of a length: 3 mm of an upper arm, less than a view of it shows
 
 
 class _Hand(msgspec.Struct):
@@ -37,6 +39,7 @@ class Seat:
     index: int
     publisher: Stream
     profile: Profile
+    measures: BodyMeasures  # as its skeleton tells them
     last_arrival_ns: int
     answered: int = 0
     overtaken: int = 0
@@ -65,6 +68,19 @@ class Seat:
             latency_max_ms=latency_max_ns / 1e6,
             position_error_m=max((hand.position_error_m for hand in hands), default=0.0),
             tracking=min((hand.tracking for hand in hands), key=TRACKING_STATES.index, default="lost"),
+        )
+
+    def has_outgrown(self, measures: BodyMeasures) -> bool:
+        """Whether these are noticeably other lengths than its skeleton tells."""
+        told = self.measures
+        return any(
+            abs(now - before) > NOTICEABLE * before
+            for now, before in (
+                (measures.stature_m, told.stature_m),
+                (measures.upper_arm, told.upper_arm),
+                (measures.forearm, told.forearm),
+                (measures.shoulder_width, told.shoulder_width),
+            )
         )
 
     def _hands(self) -> tuple[_Hand, ...]:

@@ -241,7 +241,8 @@ class Service:
         last_answer = self._inbox.take_last_answer(name)
         resumed = last_answer is not None and self._resume(index, last_answer)
         stream = declare_stream(self._session, self._keys.arms(name), self._limits.encoding)
-        seat = Seat(name, index, stream, profile, arrival.receive_time_ns, overtaken=arrival.overtaken)
+        measures = self._avatars.measures(index, profile)
+        seat = Seat(name, index, stream, profile, measures, arrival.receive_time_ns, overtaken=arrival.overtaken)
         self._seats[name] = seat
         if not self._fleet.alone:
             self._inbox.hear(name)
@@ -317,6 +318,7 @@ class Service:
                 self._tally.refused("calibration", f"{avatar}: {error}", seat)
                 return
             seat.profile = profile
+            seat.measures = self._avatars.measures(seat.index, profile)
             log.info("avatar %s: measured anew", avatar)
             if seat.last_payload is not None:
                 self._avatars.resume(seat.index, codec.arms_states.decode(seat.last_payload))
@@ -335,8 +337,21 @@ class Service:
         avatars = (seat.health(now_ns, period_s, self._inbox.refused_of(seat.name)) for seat in self._seats.values())
         health = self._tally.health(self._name, now_ns, avatars, self._fleet.services)
         self._health.put(codec.encode(health, self._limits.encoding))
+        self._tell_what_was_learnt()
         # an absolute schedule, but never a burst of healths after a stall
         self._health_at_s = max(self._health_at_s + period_s, time.monotonic())
+
+    def _tell_what_was_learnt(self) -> None:
+        """Publish the skeletons again of those whose lengths have turned out noticeably other than they tell.
+
+        Between frames, and without waiting for room: whoever misses it asks, or hears the next one.
+        """
+        for seat in self._seats.values():
+            measures = self._avatars.measures(seat.index, seat.profile)
+            if seat.has_outgrown(measures):
+                seat.measures = measures
+                key = self._keys.skeleton(seat.name)
+                put_once(self._session, key, self._skeleton(seat), self._limits.encoding, waits=False)
 
     def _of_everybody(
         self, key_of: Callable[[str], str], make: Callable[[Seat], bytes | None]
@@ -346,7 +361,7 @@ class Service:
             yield key_of(seat.name), partial(make, seat)
 
     def _skeleton(self, seat: Seat) -> bytes:
-        return codec.encode(skeleton_of(seat.name, seat.profile), self._limits.encoding)
+        return codec.encode(skeleton_of(seat.name, seat.profile, seat.measures), self._limits.encoding)
 
     def _calibration(self, seat: Seat) -> bytes:
         return codec.encode(seat.profile, self._limits.encoding)

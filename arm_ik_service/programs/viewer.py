@@ -9,6 +9,7 @@ from arm_ik_service.errors import WireError
 from arm_ik_service.io.rerun_view import Overlay, RerunView, Sink, Skin
 from arm_ik_service.io.rerun_view.live import LiveView
 from arm_ik_service.io.zenoh_streams import Bus, query, subscribe
+from arm_ik_service.programs.elbow_comfort import ElbowComforts
 from arm_ik_service.wire import codec
 from arm_ik_service.wire.keys import Keys
 
@@ -29,7 +30,8 @@ class Viewer:
         """Open the sinks and subscribe; people are drawn as `skin`, or as solids. Raises ViewError."""
         self._keys = keys
         self._stopped = Event()
-        view = RerunView(*sinks, name="arm-ik", spacing_m=SPACING_M, skin=skin, show=overlays)
+        comfort = ElbowComforts() if "swivel" in overlays else None
+        view = RerunView(*sinks, name="arm-ik", spacing_m=SPACING_M, skin=skin, show=overlays, comfort=comfort)
         self._view = LiveView(view, when_gone=self.stop)
         self.refused = 0
         self._subscribers = [

@@ -40,7 +40,7 @@ class Keys:
         return self._under(f"avatar/{avatar}/arms")
 
     def skeleton(self, avatar: str = "*") -> str:
-        """Skeleton: published once and answered to queries."""
+        """Skeleton: published when somebody comes and when their lengths change, and answered to queries."""
         return self._under(f"avatar/{avatar}/skeleton")
 
     def calibration(self, avatar: str = "*") -> str:

@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 from harness import COMMAND
 
+from arm_ik_service.bench.attached import ARRANGEMENTS, Attached
 from arm_ik_service.bench.capacity import Step, memory, most_carried
+from arm_ik_service.bench.latency import RoundTrips
 from arm_ik_service.bench.load import Measured
 from arm_ik_service.wire.messages import VERSION, Health
 
@@ -36,6 +38,28 @@ def test_latency_answers_every_frame_and_every_echo() -> None:
         assert trips["answered"] == trips["sent"] == 60
         assert 0.0 < trips["p50_ms"] <= trips["p99_ms"] <= trips["max_ms"]
     assert found["p50_ratio"] == found["service"]["p50_ms"] / found["echo"]["p50_ms"]  # type: ignore[index]
+
+
+@pytest.mark.slow
+def test_latency_beside_sinks_answers_every_frame_of_every_arrangement() -> None:
+    found = bench("latency", "--sinks", "--frames", "60")
+    for name in ARRANGEMENTS:
+        arrangement = found[name]
+        assert isinstance(arrangement, dict)
+        (block,) = arrangement["blocks"]
+        assert block["answered"] == block["sent"] == 60
+        assert arrangement["p99_ratio"] == block["p99_ms"] / found["alone"]["p99_ms"]  # type: ignore[index]
+
+
+def test_ratios_are_of_blocks_of_the_same_round() -> None:
+    def block(p99_ms: float) -> RoundTrips:
+        return RoundTrips(10, 10, p99_ms / 2.0, p99_ms, p99_ms)
+
+    blocks = {"alone": [block(1.0), block(10.0), block(1.0)], "sinks": [block(2.0), block(11.0), block(1.1)]}
+    attached = Attached(90.0, blocks)
+    assert attached.p99_ratio("sinks") == pytest.approx(1.1)
+    assert attached.p99_ms("sinks") == 2.0
+    assert attached.p50_ratio("alone") == 1.0
 
 
 @pytest.mark.slow

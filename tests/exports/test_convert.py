@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 import tracemalloc
 from collections.abc import Iterator
 from pathlib import Path
 
 import bvhio
+import msgspec
 import pyarrow.parquet
 import pytest
+from harness import COMMAND
 from mcap.reader import make_reader
 from postures import HANGING, RAISED, frame_of, motion, person
 from typer.testing import CliRunner
 
+from arm_ik_service.body.profile import Profile
 from arm_ik_service.cli import app
 from arm_ik_service.errors import SessionError, SettingsError
 from arm_ik_service.exports.dialects import McapDialect
@@ -20,6 +26,8 @@ from arm_ik_service.io.recording import RecordingWriter
 from arm_ik_service.io.session import RecordedFrame, RecordedProfile, Session, open_session
 from arm_ik_service.programs.demo import bundled_session
 from arm_ik_service.programs.export_session import export_session
+from arm_ik_service.programs.offline import solve_frames
+from arm_ik_service.settings import Settings
 from arm_ik_service.wire.messages import ArmsState
 
 
@@ -118,8 +126,6 @@ class Looped:
         self._states = motion(20)
 
     def arms(self) -> Iterator[ArmsState]:
-        import msgspec
-
         for k in range(self.frame_count):
             yield msgspec.structs.replace(self._states[k % 20], seq=k, sample_time_ns=10**9 + k * 11_111_111)
 
@@ -151,3 +157,46 @@ def test_memory_does_not_grow_with_the_session(tmp_path: Path, suffix: str, shor
         tracemalloc.stop()
         sizes.append(output.stat().st_size)
     assert peaks[1] - peaks[0] < 0.1 * (sizes[1] - sizes[0])
+
+
+def long_session(path: Path, seconds: float, *, answers: bool) -> int:
+    """Loop the bundled recording for so long; returns the number of frames."""
+    once = list(solve_frames(open_session(bundled_session("reach_and_grab")).frames(), Profile(), Settings()))
+    period_ns = once[-1][0].frame.sample_time_ns - once[0][0].frame.sample_time_ns + 13_888_889
+    count = 0
+    with RecordingWriter(path) as writer:
+        while count * period_ns < seconds * len(once) * 1e9:
+            loop, k = divmod(count, len(once))
+            recorded, state = once[k]
+            times = {"seq": count, "sample_time_ns": recorded.frame.sample_time_ns + loop * period_ns}
+            at_ns = (recorded.receive_time_ns or 0) + loop * period_ns
+            writer.write_frame("ann", msgspec.structs.replace(recorded.frame, **times), at_ns)
+            if answers:
+                writer.write_arms("ann", msgspec.structs.replace(state, avatar="ann", **times), at_ns)
+            count += 1
+    return count
+
+
+def peak_mb(*command: str) -> float:
+    """The largest resident size of a process [MB], which has to end well."""
+    with subprocess.Popen([*COMMAND, *command], stderr=subprocess.DEVNULL) as process:
+        _, status, usage = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+    assert process.returncode == 0
+    return usage.ru_maxrss / (1e6 if sys.platform == "darwin" else 1e3)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not hasattr(os, "wait4"), reason="needs wait4 to ask for a process's memory")
+@pytest.mark.parametrize("answers", [True, False], ids=["recorded", "to_be_solved"])
+def test_a_session_ten_times_as_long_becomes_bvh_in_the_same_memory(tmp_path: Path, answers: bool) -> None:
+    """Two minutes against twenty: an hour costs no more than what the index of a log of that length does."""
+    peaks = []
+    for seconds in (15.0, 120.0, 1200.0):  # the first, if anything, compiles
+        session, output = tmp_path / f"{seconds:.0f}.mcap", tmp_path / f"{seconds:.0f}.bvh"
+        frames = long_session(session, seconds, answers=answers)
+        peaks.append(peak_mb("convert", str(session), str(output)))
+        with output.open() as file:
+            assert next(int(line.split()[1]) for line in file if line.startswith("Frames:")) >= 0.99 * frames
+    assert peaks[2] - peaks[1] < 5.0, peaks
+    assert output.stat().st_size > 30e6, "what is written is many times that"

@@ -85,14 +85,17 @@ def decoded(kind: str, payload: bytes) -> Any:
     return decoder(payload)
 
 
-def test_vmc_and_vrchat_receivers_hear_the_published_state(hub: tuple[Bus, str]) -> None:
+@pytest.mark.parametrize("together", [False, True])
+def test_vmc_and_vrchat_receivers_hear_the_published_state(hub: tuple[Bus, str], together: bool) -> None:
     bus, endpoint = hub
     state = motion(30)[29]
     servers = {dialect: OscServer() for dialect in ("vmc", "vrchat")}
-    programs = [
-        Running("export", dialect, "--to", f"127.0.0.1:{server.port}", "--connect", endpoint)
-        for dialect, server in servers.items()
-    ]
+    to = {dialect: f"127.0.0.1:{server.port}" for dialect, server in servers.items()}
+    if together:
+        addresses = [word for dialect, address in to.items() for word in ("--to", f"{dialect}={address}")]
+        programs = [Running("export", "vmc", "vrchat", "openxr", *addresses, "--connect", endpoint)]
+    else:
+        programs = [Running("export", dialect, "--to", to[dialect], "--connect", endpoint) for dialect in to]
     for program in programs:
         program.wait_ready()
     vmc = publish_until(bus, [state], servers["vmc"].heard, 60)
@@ -183,6 +186,9 @@ def test_a_port_where_nobody_listens_and_bytes_that_are_no_state_do_not_end_it(h
         (("vmc", "--to", "127.0.0.1:port"), "HOST:PORT"),
         (("vrchat", "--to", "127.0.0.1:65536"), "HOST:PORT"),
         (("ros2", "--to", "127.0.0.1:1"), "--connect"),
+        (("vmc", "vrchat", "--to", "127.0.0.1:1"), "vmc=127.0.0.1:1"),
+        (("vmc", "ros2", "--to", "ros2=127.0.0.1:1"), "not sent over OSC"),
+        (("vmc", "--to", "127.0.0.1:1", "--to", "127.0.0.1:2"), "already"),
     ],
 )
 def test_an_address_that_cannot_be_used_is_refused_with_its_cure(arguments: tuple[str, ...], cause: str) -> None:
@@ -196,22 +202,27 @@ def test_a_host_without_an_address_is_named() -> None:
         VmcSink("no.such.host.invalid", 39539)
 
 
-def test_several_people_are_not_mixed_on_a_sink_that_knows_one(hub: tuple[Bus, str]) -> None:
+class Kept:
+    """A sink that keeps whom it was told of."""
+
+    wants_frames = False
+
+    def __init__(self, *, many: bool) -> None:
+        self.many = many
+        self.heard: list[str] = []
+
+    def send(self, state: ArmsState, frame: ControllerFrame | None) -> None:
+        self.heard.append(state.avatar)
+
+    def close(self) -> None:
+        pass
+
+
+def test_several_people_are_not_mixed_on_a_sink_that_knows_one_beside_one_that_knows_all(hub: tuple[Bus, str]) -> None:
     bus, endpoint = hub
-    heard: list[str] = []
-
-    class OnePerson:
-        many = False
-        wants_frames = False
-
-        def send(self, state: ArmsState, frame: ControllerFrame | None) -> None:
-            heard.append(state.avatar)
-
-        def close(self) -> None:
-            pass
-
+    one, all_of_them = Kept(many=False), Kept(many=True)
     with open_client(BusOptions(connect=(endpoint,)), wait_s=10.0) as client:
-        exporter = Exporter(client, OnePerson(), KEYS)
+        exporter = Exporter(client, [one, all_of_them], KEYS)
         worker = Thread(target=exporter.run)
         worker.start()
         streams = {name: declare_stream(bus, KEYS.arms(name), "msgpack") for name in ("ann", "bob")}
@@ -219,7 +230,8 @@ def test_several_people_are_not_mixed_on_a_sink_that_knows_one(hub: tuple[Bus, s
             for name, stream in streams.items():
                 stream.put(encode(person(avatar=name, seq=seq)))
             time.sleep(0.005)
-        assert wait_for(lambda: len(heard) > 10)
+        assert wait_for(lambda: len(one.heard) > 10)
         exporter.stop()
         worker.join(5.0)
-    assert len(set(heard)) == 1
+    assert len(set(one.heard)) == 1
+    assert set(all_of_them.heard) == {"ann", "bob"}

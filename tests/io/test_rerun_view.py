@@ -91,7 +91,7 @@ def test_both_timelines_are_those_of_the_messages(arms_and_recording: tuple[list
         assert times == [(arms.seq, arms.sample_time_ns) for _, arms in answers]
 
 
-def test_angles_and_their_velocities_are_plotted_in_degrees_between_their_limits(
+def test_angles_and_their_velocities_are_plotted_in_degrees_between_bands_that_begin_at_their_limits(
     arms_and_recording: tuple[list[Answer], Recorded],
 ) -> None:
     answers, log = arms_and_recording
@@ -103,7 +103,10 @@ def test_angles_and_their_velocities_are_plotted_in_degrees_between_their_limits
             np.testing.assert_allclose(series[:, 2 + k], np.rad2deg(angles))
             np.testing.assert_allclose(rates[:, k], -np.rad2deg(angles))
         if name == "elbow_flexion":
-            np.testing.assert_allclose(series[:, :2], np.rad2deg([[0.0, 2.6]] * len(answers)))
+            limits = np.rad2deg([0.0, 2.6])
+            np.testing.assert_allclose(series[::2, :2], [limits] * (len(answers) // 2))
+            beyond = limits + 0.08 * limits[1] * np.array([-1.0, 1.0])
+            np.testing.assert_allclose(series[1::2, :2], [beyond] * (len(answers) // 2), err_msg="to and fro")
         else:
             assert np.isnan(series[:, :2]).all()
 
@@ -244,6 +247,22 @@ def test_the_eye_goes_along_with_one_person_and_stays_where_it_sees_all_of_many(
     assert min(apart) > 1.19
     target = np.array(last["look_target"][0])
     np.testing.assert_allclose(target[[0, 2]], [0.5 * np.ptp(np.array(places)[:, k]) for k in (0, 2)], atol=1e-5)
+
+
+def test_the_eye_stands_still_and_sees_all_of_a_stage(tmp_path: Path) -> None:
+    path, places = tmp_path / "stage.rrd", [(0.0, 1.4, 0.0), (0.5, 0.8, -3.0), (1.0, 1.2, -1.6)]
+    with RerunView(Save(path)) as view:
+        view.stage(places)
+        frame, arms = answer(0)
+        view.add(arms, frame)
+    (eye,) = eyes_of(path)
+    assert not eye.get("tracking_entity")
+    position, target = np.array(eye["position"][0]), np.array(eye["look_target"][0])
+    gaze = (target - position) / np.linalg.norm(target - position)
+    for place in places:
+        away = (place - position) / np.linalg.norm(place - position)
+        assert np.degrees(np.arccos(away @ gaze)) < 28.0
+    assert position[0] > 1.0, "from the right of somebody who goes along -z"
 
 
 def test_a_live_view_pairs_answers_with_frames_that_come_before_or_after(tmp_path: Path) -> None:

@@ -19,16 +19,20 @@ from arm_ik_service.errors import SettingsError
 from arm_ik_service.geometry import batch
 from arm_ik_service.io.rerun_view import OVERLAYS, RerunView, Save
 from arm_ik_service.io.rerun_view.gauges import (
+    BRACKET_M,
     DIALS,
+    LEAST_CIRCLE_M,
     RADIUS_M,
     REGION_RADIUS_M,
     Arm,
     dial,
+    elbow_bracket,
     elbow_circle,
     inside,
     swing_region,
 )
 from arm_ik_service.io.rerun_view.rows import RESTS, row_of
+from arm_ik_service.programs.elbow_comfort import ElbowComforts
 from arm_ik_service.skeleton import skeleton_of
 from arm_ik_service.wire.messages import SIDES, ArmsState, Side
 
@@ -123,6 +127,32 @@ def test_the_bright_part_of_the_circle_holds_the_elbow_and_ends_at_the_shoulders
         assert not swing_allowed(model, beyond - shoulder[:3], chest).any()
 
 
+@pytest.mark.parametrize("side", SIDES)
+def test_the_bracket_stands_on_the_circle_and_off_the_arm_between_its_swivels(side: Side, rows: Floats) -> None:
+    _, _, spoke = elbow_circle(Arm.of(side, rows), None)
+    bent = np.linalg.norm(spoke[:, -1] - spoke[:, 0], axis=1) > LEAST_CIRCLE_M
+    straight = elbow_bracket(Arm.of(side, rows[~bent]), np.tile([-0.3, 0.5], ((~bent).sum(), 1)))
+    assert (np.ptp(straight, axis=1) == 0.0).all()
+    arm, spoke = Arm.of(side, rows[bent]), spoke[bent]
+    bracket = elbow_bracket(arm, np.tile([-0.3, 0.5], (bent.sum(), 1)))
+    centre, radius = spoke[:, 0], np.linalg.norm(spoke[:, -1] - spoke[:, 0], axis=1)
+    away = np.linalg.norm(bracket - centre[:, None], axis=2)
+    np.testing.assert_allclose(away[:, [0, -1]], np.repeat(radius[:, None], 2, 1), atol=1e-9)
+    np.testing.assert_allclose(away[:, 1:-1], np.repeat(radius[:, None] + BRACKET_M, away.shape[1] - 2, 1), atol=1e-9)
+    axis = batch.normalized(arm.hand[:, :3] - arm.upper_arm[:, :3])
+    for end, swivel in ((0, -0.3), (-1, 0.5)):
+        turned = centre + batch.rotate(batch.exp(swivel * axis), spoke[:, -1] - centre)
+        np.testing.assert_allclose(bracket[:, end], turned, atol=1e-9)
+
+
+def test_the_swivel_overlay_has_a_bracket_where_comfort_is_told_and_else_none(tmp_path: Path) -> None:
+    told = logged(tmp_path / "told.rrd", frozenset({"swivel"}), comfort=ElbowComforts())
+    untold = logged(tmp_path / "untold.rrd", frozenset({"swivel"}))
+    for found, strips in ((told, 4), (untold, 3)):
+        assert {len(lines) for lines in found["left/swivel", "LineStrips3D:strips"]} == {strips}  # type: ignore[arg-type]
+        assert np.isfinite(np.array(found["left/swivel", "LineStrips3D:strips"], float)).all()
+
+
 def swing_allowed(model: ArmModel, away: Floats, chest: Floats) -> npt.NDArray[np.bool_]:
     """What the arm model itself says of humeri that point along `away` (N,3)."""
     local = batch.rotate(batch.conjugate(chest[3:]), batch.normalized(away))
@@ -170,9 +200,12 @@ def test_a_persons_own_limits_are_the_ones_that_are_told() -> None:
     assert plain["elbow_flexion"] > limits["elbow_flexion"][1]
 
 
-def logged(path: Path, show: frozenset[str], rests: tuple[str, ...] = ()) -> dict[tuple[str, str], list[object]]:
+def logged(
+    path: Path, show: frozenset[str], rests: tuple[str, ...] = (), comfort: ElbowComforts | None = None
+) -> dict[tuple[str, str], list[object]]:
     skeleton = msgspec.structs.replace(skeleton_of("ann", Profile()), avatar="ann")
-    with RerunView(Save(path), show=frozenset(overlay for overlay in OVERLAYS if overlay in show)) as view:
+    overlays = frozenset(overlay for overlay in OVERLAYS if overlay in show)
+    with RerunView(Save(path), show=overlays, comfort=comfort) as view:
         view.describe(skeleton)
         for seq in range(3):
             frame, arms = answer(seq)

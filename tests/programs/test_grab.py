@@ -154,12 +154,11 @@ def test_a_cube_that_is_put_elsewhere_is_followed(when: str) -> None:
 
 
 @pytest.mark.parametrize("name", SOLVERS)
-def test_every_solver_drives_it(name: str) -> None:
-    moments = list(Scene(np.array([0.25, 1.2, -0.7]), choice=SolverChoice(name, {})).moments(2.2))
-    assert moments[-1].stage == "carry"
-    hand = np.array(moments[-1].arms.right.bones.hand.position)
-    assert np.linalg.norm(moments[-1].cube[:3] - [0.25, 1.2, -0.7]) > 0.08, "the cube came along"
-    assert np.linalg.norm(moments[-1].cube[:3] - hand) < 0.11
+def test_every_solver_drives_it_to_its_end(name: str) -> None:
+    """To a goal that asks for a hand turned further than a wrist goes: three of them once traded the place for that."""
+    *_, last = Scene(CUBE, GOAL, choice=SolverChoice(name, {})).moments(12.0)
+    assert last.stage == "done"
+    np.testing.assert_allclose(last.cube[:3], GOAL, atol=0.004)
 
 
 def test_a_cube_on_the_left_is_taken_with_the_left_hand() -> None:

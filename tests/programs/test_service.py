@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import math
 import random
 import signal
 import time
+from itertools import pairwise
+from pathlib import Path
 
 import msgspec
 import pytest
 from harness import KEYS, Running, Service, standing, wait_for
 
-from arm_ik_service.io.zenoh_streams import put_once, query
+from arm_ik_service.io.recording import open_recording
+from arm_ik_service.io.zenoh_streams import put_once, query, subscribe
 from arm_ik_service.wire import codec
+from arm_ik_service.wire.messages import Skeleton, TrackedPose
 
 PERIOD_NS = 11_111_111
 
@@ -74,6 +79,30 @@ def test_skeleton_and_calibration_answer_queries_for_one_and_for_all(service: Se
     assert len(skeleton.joint_limits) == 9
     calibration = msgspec.msgpack.decode(dict(query(service.bus, KEYS.calibration("8")))[KEYS.calibration("8")])
     assert "grip" in calibration
+
+
+def test_lengths_that_are_learnt_are_told_again_once_they_have_changed_and_recorded(
+    service: Service, tmp_path: Path
+) -> None:
+    told: list[Skeleton] = []
+    subscribe(service.bus, KEYS.skeleton("7"), lambda _key, payload, _t: told.append(codec.skeletons.decode(payload)))
+    recorder = Running("record", str(tmp_path / "tall.mcap"), "--connect", service.endpoint)
+    recorder.wait_ready()
+    stream = service.stream("7")
+    eyes = TrackedPose((0.0, 1.85, 0.0), (0.0, 0.0, 0.0, 1.0))
+    for seq in range(80):
+        service.ask(stream, "7", msgspec.structs.replace(standing(seq, seq * 50_000_000, 0.25), head=eyes))
+    assert wait_for(lambda: bool(told) and abs(told[-1].stature_m - 1.85 / 0.936) < 0.03), told
+    assert told[0].stature_m == 1.75, "nothing is known of somebody who has just come"
+    bones = service.take(80)[-1].right.bones
+    upper_arm_m = math.dist(bones.upper_arm.position, bones.forearm.position)
+    assert told[-1].upper_arm_m == pytest.approx(upper_arm_m, rel=0.01)
+    lengths = [skeleton.upper_arm_m for skeleton in told]
+    assert all(abs(b - a) > 0.005 * a for a, b in pairwise(lengths)), "not for every millimetre"
+    late = codec.skeletons.decode(dict(query(service.bus, KEYS.skeleton("7")))[KEYS.skeleton("7")])
+    assert late == told[-1], "whoever comes late hears what the others did"
+    assert recorder.end() == 0
+    assert open_recording(tmp_path / "tall.mcap").skeleton("7") == told[-1]
 
 
 def test_ids_with_odd_characters_are_refused_by_name(service: Service) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from harness import COMMAND, KEYS, Running, Service, wait_for
 
-from arm_ik_service.io.recording import RecordingWriter
+from arm_ik_service.io.recording import RecordingWriter, open_recording
 from arm_ik_service.io.session import open_session
 from arm_ik_service.io.zenoh_bus import BusOptions, open_client
 from arm_ik_service.io.zenoh_streams import put_once, subscribe
@@ -127,6 +127,26 @@ def test_killing_every_other_program_leaves_the_service_answering_and_a_log_that
     played = arm_ik("replay", str(log), "--speed", "20", "--avatar", "again", "--json", *connect)
     assert played.returncode == 0, played.stderr
     assert json.loads(played.stdout)["frames"] > 60
+
+
+@pytest.mark.slow
+def test_a_view_records_beside_what_it_shows(service: Service, recording: Path, tmp_path: Path) -> None:
+    log, seen = tmp_path / "beside.mcap", tmp_path / "seen.rrd"
+    beside = ["--save", str(seen), "--record", str(log), "--connect", service.endpoint]
+    view = Running("view", *beside)
+    view.wait_ready()
+    assert arm_ik("replay", str(recording), "--to", "2", "--connect", service.endpoint).returncode == 0
+    answers = service.take(10_000, 0.5)
+    assert view.end() == 0
+    session = open_recording(log)
+    assert [state.seq for state in session.arms()] == [state.seq for state in answers]
+    assert session.frame_count == len({recorded.frame.seq for recorded in session.frames()}) >= len(answers)
+    assert session.skeleton("demo") is not None
+    assert view.says(f"{len(answers)} answers drawn")
+    assert seen.stat().st_size > 100_000
+    again = Running("view", *beside)
+    assert again.finish() == 2
+    assert "exists" in again.lines[-1]
 
 
 def test_a_replay_started_before_the_service_waits_and_then_plays(recording: Path) -> None:

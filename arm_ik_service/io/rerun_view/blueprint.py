@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
 import rerun.blueprint as rrb
 from rerun.blueprint import archetypes
 
@@ -14,6 +15,7 @@ from arm_ik_service.wire.messages import Pose, Vector
 WINDOW_S = 5.0  # what a plot shows, up to the time cursor
 WINDOW_FRAMES = 450  # the same on the timeline `frame`, at 90 Hz
 LEGEND_HEIGHT = 0.075
+HALF_BODY_M = 0.85
 
 Views = list["rrb.View | rrb.Container"]
 
@@ -42,6 +44,23 @@ def eye_in_front_of(
         look_target=_raised(middle, -0.5 if whole else -0.14),
         eye_up=(0.0, 1.0, 0.0),
         tracking_entity=follow,
+    )
+
+
+def eye_beside(places: Sequence[Vector]) -> archetypes.EyeControls3D:
+    """Look at all of these places, the first of which somebody leaves for the others, from their right and ahead."""
+    points = np.array(places)
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle = np.array([0.5 * (low[0] + high[0]), HALF_BODY_M, 0.5 * (low[2] + high[2])])
+    legs = (points - points[0]) * [1.0, 0.0, 1.0]
+    way = legs[np.linalg.norm(legs, axis=1).argmax()]
+    span = float(np.linalg.norm(way))
+    ahead = way / span if span > 0.1 else np.array([0.0, 0.0, -1.0])
+    right = np.array([-ahead[2], 0.0, ahead[0]])
+    distance = 1.9 + 0.65 * span
+    position = middle + distance * (0.82 * right + 0.5 * ahead + [0.0, 0.28, 0.0])
+    return archetypes.EyeControls3D(
+        kind=rrb.Eye3DKind.Orbital, position=position, look_target=middle, eye_up=(0.0, 1.0, 0.0)
     )
 
 
@@ -112,19 +131,26 @@ def _everybody(roots: Sequence[str]) -> rrb.Container:
 
 
 def blueprint_of(
-    roots: dict[str, str], chests: Sequence[Pose], followed: str | None = None, *, whole: bool = False
+    roots: dict[str, str],
+    chests: Sequence[Pose],
+    followed: str | None = None,
+    *,
+    whole: bool = False,
+    stage: Sequence[Vector] = (),
 ) -> rrb.Blueprint:
     """Lay out the avatars `roots`: id -> entity; `chests` are where they are now, for the eye.
 
     One avatar has its plots beside it, and the eye goes along with the entity `followed`. Many stand in one wide
-    picture; beside it is a tab for what concerns everybody, and one for each.
+    picture; beside it is a tab for what concerns everybody, and one for each. Where something is to happen between the
+    places of a `stage`, the eye stands still and sees all of them.
     """
+    eye = eye_beside(stage) if stage else eye_in_front_of(chests, followed, whole=whole)
     people = rrb.Vertical(
         rrb.Spatial3DView(
             origin="/",
             contents="/**",
             name="arms",
-            eye_controls=eye_in_front_of(chests, followed, whole=whole),
+            eye_controls=eye,
             background=archetypes.Background(color=(24, 27, 33)),
             line_grid=archetypes.LineGrid3D(visible=True, spacing=0.5, stroke_width=0.5, color=(150, 160, 180, 60)),
         ),

@@ -10,7 +10,7 @@ import rerun as rr
 
 from arm_ik_service.geometry import batch
 from arm_ik_service.io.rerun_view import figure
-from arm_ik_service.io.rerun_view.overlays import HIDDEN, Overlay, OverlaySender
+from arm_ik_service.io.rerun_view.overlays import HIDDEN, ComfortOf, Overlay, OverlaySender
 from arm_ik_service.io.rerun_view.palette import LATENCY_COLOURS, LIMIT, NAME, RESIDUAL, SIDE_COLOURS, STATE_COLOURS
 from arm_ik_service.io.rerun_view.rows import ANGLES, LATENCIES, PLACES, Floats, Rows
 from arm_ik_service.io.rerun_view.skinned import Skin, SkinSender
@@ -23,6 +23,8 @@ GIRDLE_ROOT = (0.035, 0.014, 0.0)  # of the right side, in the chest frame [m]
 SKULL_BASE = (0.0, -0.075, 0.082)  # in the head frame [m]
 ABOVE_HEAD = (0.0, 0.24, 0.085)  # in the head frame [m]
 LINE_RADIUS_M = 0.0035
+BAND_MARGIN = 0.08  # of a joint's range: how far beyond it its plot shows what it cannot do
+BAND_WIDTH = 3.0  # of the lines that fill it, one a frame
 FOREARM_PER_STATURE, HAND_PER_FOREARM = 0.146, 0.108 / 0.146  # Drillis & Contini 1966
 
 
@@ -83,8 +85,9 @@ def log_styles(recording: rr.RecordingStream, root: str) -> None:
             f"{root}/plots/angles/{name}",
             rr.SeriesLines(
                 colors=[LIMIT, LIMIT, *sides],
-                widths=[1.0, 1.0, 1.6, 1.6],
-                names=["lower limit", "upper limit", *SIDES],
+                widths=[BAND_WIDTH, BAND_WIDTH, 1.6, 1.6],
+                names=["below its range", "above its range", *SIDES],
+                aggregation_policy="MinMax",  # a mean would draw the bands in
             ),
             static=True,
         )
@@ -144,14 +147,16 @@ class Sender:
         root: str,
         skin: Skin | None = None,
         show: frozenset[Overlay] = frozenset(),
+        comfort: ComfortOf | None = None,
     ) -> None:
-        self._overlays = OverlaySender(recording, root, show)
+        self._overlays = OverlaySender(recording, root, show, comfort)
         self._skin = SkinSender(recording, root, skin) if skin is not None else None
         self._replaced = skin.replaces if skin is not None else set()
         self._tints_hands = skin is None or skin.arms_only
         self._limits_deg: Floats = np.full((len(ANGLES), 2), np.nan)
         self._wrist_from_grip: dict[Side, Floats] = {}
         self._lengths_m: dict[str, float] = {}
+        self._sent = 0  # rows
         self._recording = recording
         self._root = root
         self._states: dict[Side, TrackingState | None] = dict.fromkeys(SIDES)
@@ -185,7 +190,7 @@ class Sender:
         for k, side in enumerate(SIDES):
             self._send_side(side, values)
             self._send_state(side, [pair[k] for pair in rows.states], frames, times)
-        self._overlays.send(values, self._time, self._wrist_from_grip)
+        self._overlays.send(values, self._time, times, self._wrist_from_grip)
         self._send_plots(values)
 
     def _columns(self, entity: str, columns: Iterable[rr.ComponentColumn]) -> None:
@@ -255,10 +260,15 @@ class Sender:
     def _send_plots(self, values: Floats) -> None:
         angles = [np.rad2deg(values[:, PLACES[f"{side}/angles"]]) for side in SIDES]
         rates = [np.rad2deg(values[:, PLACES[f"{side}/rates"]]) for side in SIDES]
-        flat = np.ones(len(values))
+        # Rerun fills no areas: a line that goes to and fro between two heights at every frame looks like one
+        fro = (np.arange(self._sent, self._sent + len(values)) % 2).astype(float)
+        self._sent += len(values)
         for k, name in enumerate(ANGLES):
             lower, upper = self._limits_deg[k]
-            self._scalars(f"angles/{name}", np.stack([lower * flat, upper * flat, *(a[:, k] for a in angles)], axis=1))
+            beyond = BAND_MARGIN * (upper - lower) * fro
+            self._scalars(
+                f"angles/{name}", np.stack([lower - beyond, upper + beyond, *(a[:, k] for a in angles)], axis=1)
+            )
             self._scalars(f"rates/{name}", np.stack([r[:, k] for r in rates], axis=1))
         residual = [values[:, PLACES[f"{side}/residual_mm"]] for side in SIDES]
         self._scalars("residual_mm", np.concatenate(residual, axis=1))

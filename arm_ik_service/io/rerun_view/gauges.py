@@ -28,6 +28,8 @@ RADIUS_M = {
     "wrist_deviation": 0.15,
 }
 REGION_RADIUS_M = 0.17
+BRACKET_M = 0.075  # off the elbow's circle: outside an arm
+LEAST_CIRCLE_M = 0.02
 SWIVEL_POINTS = 73  # of the circle: every 5 degrees
 
 
@@ -82,18 +84,49 @@ def swing_region(arm: Arm, region: SwingRegion) -> Floats:
     return arm.upper_arm[:, None, :3] + REGION_RADIUS_M * batch.rotate(arm.chest[:, None, 3:], edge)
 
 
-def elbow_circle(arm: Arm, region: SwingRegion | None) -> tuple[Floats, Floats, Floats]:
-    """Circle (N, SWIVEL_POINTS, 3) on which the elbow can go, the part of it around the elbow that the shoulder lets
-    it reach (as many points), and a line (N, SWIVEL_POINTS, 3) from its middle to the elbow; world axes [m].
+def elbow_arc(arm: Arm, swivels: Floats) -> Floats:
+    """Where the elbow would be (N,P,3), world axes [m], at swivels (N,P) [rad] about the line from shoulder to wrist.
+
+    They count from where it is.
     """
+    centre, out, aside = _elbow_plane(arm)
+    turn = swivels[..., None]
+    return np.asarray(centre[:, None] + np.cos(turn) * out[:, None] + np.sin(turn) * aside[:, None])
+
+
+def _elbow_plane(arm: Arm) -> tuple[Floats, Floats, Floats]:
+    """Middle of the elbow's circle (N,3), the way from there to the elbow, and the way a quarter turn on [m]."""
     shoulder, elbow, wrist = arm.upper_arm[:, :3], arm.forearm[:, :3], arm.hand[:, :3]
     axis = batch.normalized(wrist - shoulder)
     centre = shoulder + np.sum((elbow - shoulder) * axis, axis=1, keepdims=True) * axis
     out = elbow - centre
-    aside = np.cross(axis, out)
-    swivel = np.linspace(-np.pi, np.pi, SWIVEL_POINTS)[:, None]
+    return centre, out, np.cross(axis, out)
 
-    circle = centre[:, None] + np.cos(swivel) * out[:, None] + np.sin(swivel) * aside[:, None]
+
+def elbow_bracket(arm: Arm, ends: Floats) -> Floats:
+    """A bracket (N, SWIVEL_POINTS, 3) around a stretch of the elbow's circle, between the swivels `ends` (N,2) [rad].
+
+    It stands off the circle, which runs inside the arm where the elbow is. Where the circle is hardly one, as that of
+    a straight arm, it is a point.
+    """
+    share = np.linspace(0.0, 1.0, SWIVEL_POINTS - 2)
+    swivels = ends[:, :1] + share * (ends[:, 1:] - ends[:, :1])
+    centre, out, _ = _elbow_plane(arm)
+    radius = np.linalg.norm(out, axis=1)
+    wider = np.where(radius > LEAST_CIRCLE_M, 1.0 + BRACKET_M / np.maximum(radius, LEAST_CIRCLE_M), 0.0)
+    feet = elbow_arc(arm, ends)
+    arc = centre[:, None] + wider[:, None, None] * (elbow_arc(arm, swivels) - centre[:, None])
+    feet = np.where(wider[:, None, None] > 0.0, feet, centre[:, None])
+    return np.concatenate([feet[:, :1], arc, feet[:, 1:]], axis=1)
+
+
+def elbow_circle(arm: Arm, region: SwingRegion | None) -> tuple[Floats, Floats, Floats]:
+    """Circle (N, SWIVEL_POINTS, 3) on which the elbow can go, the part of it around the elbow that the shoulder lets
+    it reach (as many points), and a line (N, SWIVEL_POINTS, 3) from its middle to the elbow; world axes [m].
+    """
+    shoulder, (centre, out, _) = arm.upper_arm[:, :3], _elbow_plane(arm)
+    swivel = np.linspace(-np.pi, np.pi, SWIVEL_POINTS)
+    circle = elbow_arc(arm, np.broadcast_to(swivel, (len(centre), SWIVEL_POINTS)))
     free: Flags = np.ones(circle.shape[:2], bool)
     if region is not None:
         away = batch.rotate(batch.conjugate(arm.chest[:, None, 3:]), circle - shoulder[:, None])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Literal, get_args
 
 import numpy as np
@@ -9,17 +10,28 @@ import rerun as rr
 
 from arm_ik_service.geometry import batch
 from arm_ik_service.io.rerun_view import figure
-from arm_ik_service.io.rerun_view.gauges import DIALS, Arm, Flags, dial, elbow_circle, swing_region
-from arm_ik_service.io.rerun_view.palette import AT_LIMIT, FAINT, GHOST, RANGE, REACH, SIDE_COLOURS
+from arm_ik_service.io.rerun_view.gauges import (
+    DIALS,
+    Arm,
+    Flags,
+    dial,
+    elbow_bracket,
+    elbow_circle,
+    swing_region,
+)
+from arm_ik_service.io.rerun_view.palette import AT_LIMIT, COMFORT, FAINT, GHOST, RANGE, REACH, SIDE_COLOURS
 from arm_ik_service.io.rerun_view.rows import ANGLES, PLACES, RESTS, Floats
 from arm_ik_service.io.rerun_view.solids import Colour
+from arm_ik_service.io.rerun_view.timelines import Integers
 from arm_ik_service.wire.messages import SIDES, Side, Skeleton
 
+# Of an arm and the times (N,) [ns] of its frames: the swivels (N,2) [rad] from the elbow that are comfortable.
+ComfortOf = Callable[[Skeleton, Arm, Integers], Floats]
 Overlay = Literal["reach", "swivel", "limits", "ghost"]
 OVERLAYS: tuple[Overlay, ...] = get_args(Overlay)
 LEGEND: dict[Overlay, str] = {
     "reach": "**Ball**: what the wrist can reach.",
-    "swivel": "**Ring**: where the elbow can go, bright where the shoulder lets it.",
+    "swivel": "**Ring**: the elbow's circle, bright where the shoulder lets it; **bracket**: where it is comfortable.",
     "limits": "**Rose**: ranges of the joints, needle: their angle, red: at the limit.",
     "ghost": "**Pale hand**: the raw target's.",
 }
@@ -30,8 +42,10 @@ THIN_M, THICK_M = 0.0015, 0.0035  # radii of lines
 class OverlaySender:
     """Draws the chosen overlays of one avatar, below the entity `root`."""
 
-    def __init__(self, recording: rr.RecordingStream, root: str, show: frozenset[Overlay]) -> None:
-        self._recording, self._root, self._show = recording, root, show
+    def __init__(
+        self, recording: rr.RecordingStream, root: str, show: frozenset[Overlay], comfort: ComfortOf | None = None
+    ) -> None:
+        self._recording, self._root, self._show, self._comfort = recording, root, show, comfort
         self._skeleton: Skeleton | None = None
         self._time: list[rr.TimeColumn] = []
 
@@ -60,9 +74,12 @@ class OverlaySender:
                     ),
                 )
             if "swivel" in self._show:
-                self._log(f"{side}/swivel", _lines([FAINT, SIDE_COLOURS[side], SIDE_COLOURS[side]], (1, 2, 1)))
+                colours = [FAINT, SIDE_COLOURS[side], SIDE_COLOURS[side], COMFORT]
+                self._log(f"{side}/swivel", _lines(colours, (1, 2, 1, 2)))
 
-    def send(self, values: Floats, time: list[rr.TimeColumn], wrist_from_grip: dict[Side, Floats]) -> None:
+    def send(
+        self, values: Floats, time: list[rr.TimeColumn], times_ns: Integers, wrist_from_grip: dict[Side, Floats]
+    ) -> None:
         """Log rows (N, WIDTH) under their times."""
         self._time = time
         for side in SIDES:
@@ -70,7 +87,7 @@ class OverlaySender:
             if "reach" in self._show:
                 self._send_reach(arm)
             if "swivel" in self._show:
-                self._send_swivel(arm)
+                self._send_swivel(arm, times_ns)
             if "limits" in self._show:
                 self._send_limits(arm, values[:, PLACES[f"{side}/rests"]] > 0.5)
             if "ghost" in self._show:
@@ -90,10 +107,12 @@ class OverlaySender:
         pose = rr.Transform3D.columns(translation=shoulder, quaternion=arm.chest[:, 3:], scale=scale)
         self._columns(f"{arm.side}/reach", pose)
 
-    def _send_swivel(self, arm: Arm) -> None:
+    def _send_swivel(self, arm: Arm, times_ns: Integers) -> None:
         assert self._skeleton is not None
-        strips = np.stack(elbow_circle(arm, self._skeleton.shoulder_swing), axis=1)
-        self._columns(f"{arm.side}/swivel", _strip_columns(strips))
+        strips = [*elbow_circle(arm, self._skeleton.shoulder_swing)]
+        if self._comfort is not None:
+            strips.append(elbow_bracket(arm, self._comfort(self._skeleton, arm, times_ns)))
+        self._columns(f"{arm.side}/swivel", _strip_columns(np.stack(strips, axis=1)))
 
     def _send_limits(self, arm: Arm, rests: Flags) -> None:
         assert self._skeleton is not None

@@ -12,9 +12,10 @@ STATE_COLOURS: dict[TrackingState, Colour] = {
     "held": (226, 80, 150),
     "lost": (120, 126, 138),
 }
-LIMIT: Colour = (150, 70, 76)
+LIMIT: Colour = (92, 44, 50)
 AT_LIMIT: Colour = (255, 70, 70)
 RANGE: Colour = (176, 128, 132)
+COMFORT: Colour = (250, 240, 190)
 FAINT: Colour = (96, 104, 118)
 REACH = 22  # opacity of a reach sphere
 GHOST = (235, 238, 255, 90)

@@ -27,7 +27,7 @@ from arm_ik_service.wire.messages import SIDES, Skeleton
 PIECE = 64  # frames skinned and sent together: 6 MB
 FITS_WITHIN = 0.015  # of the arm's length, 8 mm: nobody sees that at a wrist
 SLEEVE_ENDS = 0.88  # of the forearm, where arms alone wear sleeves
-WHITE = (255, 255, 255)  # a hand to be tinted by its tracking state
+WHITE = 255  # a hand to be tinted by its tracking state
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ class SkinSender:
         for bone, triangles in carriers.items():
             part = _part(puppet.mesh, triangles)
             if (entity := self._tinted_hand(bone)) is not None:
-                part = _in_hand_frame(part, puppet, bone)
+                part = replace(_in_hand_frame(part, puppet, bone), colours=np.full_like(part.colours, WHITE))
             self._log(entity or f"skin/{PARTS[bone]}", part, static_vertices=True)
         puppet.mesh = _part(puppet.mesh, bending)
         self._log("skin/bending", puppet.mesh, static_vertices=False)
@@ -178,12 +178,11 @@ def _in_hand_frame(mesh: SkinnedMesh, puppet: Puppet, bone: int) -> SkinnedMesh:
 
 
 def _sleeves(mesh: SkinnedMesh) -> npt.NDArray[np.uint8]:
-    """Sleeves in the colours of the sides, white hands, and the skin's own colour between them."""
+    """Sleeves in the colours of the sides, and the skin's own colour beyond them."""
     colours = mesh.colours.copy()
     for side in SIDES:
-        parts = [PARTS.index(f"{side}{part}") for part in ("UpperArm", "LowerArm", "Hand")]
+        parts = [PARTS.index(f"{side}{part}") for part in ("LowerArm", "Hand")]
         mine = (mesh.vertices[:, 0] > 0.0) == (side == "right")
-        elbow, wrist = mesh.joints[parts[1]], mesh.joints[parts[2]]
+        elbow, wrist = mesh.joints[parts]
         colours[mine & (along(mesh.vertices, elbow, wrist) < SLEEVE_ENDS)] = SIDE_COLOURS[side]
-        colours[mine & (mesh.bones[:, 0] == parts[2]) & (mesh.weights[:, 0] > 1.0 - 1e-9)] = WHITE
     return colours

@@ -16,20 +16,20 @@ from arm_ik_service.errors import ViewError
 from arm_ik_service.io.rerun_view.blueprint import blueprint_of
 from arm_ik_service.io.rerun_view.entities import Sender, entity_of, log_name, log_styles, skeleton_of
 from arm_ik_service.io.rerun_view.overlays import LEGEND as OVERLAY_LEGEND
-from arm_ik_service.io.rerun_view.overlays import Overlay
+from arm_ik_service.io.rerun_view.overlays import ComfortOf, Overlay
 from arm_ik_service.io.rerun_view.props import Box, Legs
 from arm_ik_service.io.rerun_view.rows import Rows
 from arm_ik_service.io.rerun_view.sinks import Save, Sink, attach, first_line
 from arm_ik_service.io.rerun_view.skinned import Skin
-from arm_ik_service.wire.messages import ArmsState, ControllerFrame, Pose, Skeleton
+from arm_ik_service.wire.messages import ArmsState, ControllerFrame, Pose, Skeleton, Vector
 
 APPLICATION = "arm_ik"
 CLOSE_WITHIN_S = 5.0
 BATCH_ROWS = 512  # offline: rows gathered before they are sent; a call then costs nothing a row
 ROW = 5  # people beside each other
 LEGEND = """\
-**Sleeves, plots**: left blue, right orange. **Dark red**: joint limits. **White controller**: the pose asked for; \
-**red line**: from the hand to it. **Hands**: tracked green, inferred yellow, held pink, lost grey. \
+**Sleeves, plots**: left blue, right orange. **Dark red**: beyond a joint's range. **White controller**: the pose \
+asked for; **red line**: from the hand to it. **Hands**: tracked green, inferred yellow, held pink, lost grey. \
 **Latency**: network blue, solve violet, total white."""
 
 
@@ -58,10 +58,12 @@ class RerunView:
         spacing_m: float = 0.0,
         skin: Skin | None = None,
         show: frozenset[Overlay] = frozenset(),
+        comfort: ComfortOf | None = None,
     ) -> None:
         """Open the sinks; `name` titles the recording, `spacing_m` sets avatars apart that share one origin.
 
-        With a `skin` everybody is drawn as that character; without, as solids. `show` adds what explains the arms.
+        With a `skin` everybody is drawn as that character; without, as solids. `show` adds what explains the arms;
+        `comfort` tells where elbows would be comfortable, which "swivel" then marks.
 
         Raises ViewError.
         """
@@ -71,9 +73,11 @@ class RerunView:
         self._spacing_m = spacing_m
         self._skin = skin
         self._show = show
+        self._comfort = comfort
         self._people: dict[str, _Person] = {}
         self._boxes: list[Box] = []
         self._legs: list[Legs] = []
+        self._stage: list[Vector] = []
         self._whole = skin is not None and not skin.arms_only  # people are seen down to their feet
         self._described: dict[str, Skeleton] = {}
         if name:
@@ -111,6 +115,10 @@ class RerunView:
         self._whole = True
         self._legs.append(Legs(self._recording, f"{entity_of(avatar)}/legs"))
         return self._legs[-1]
+
+    def stage(self, places: Iterable[Vector]) -> None:
+        """Say where something is going to happen, from where somebody begins on: the eye will see all of it."""
+        self._stage = list(places)
 
     def flush(self) -> None:
         """Send what was gathered. Does not wait for the viewer; what it has not taken yet waits in memory."""
@@ -165,7 +173,7 @@ class RerunView:
     def _meet(self, arms: ArmsState) -> _Person:
         """Log everything static of an avatar that is seen for the first time, and lay the viewer out anew."""
         root = entity_of(arms.avatar)
-        person = _Person(root, Sender(self._recording, root, self._skin, self._show), arms.chest)
+        person = _Person(root, Sender(self._recording, root, self._skin, self._show, self._comfort), arms.chest)
         aside, behind = _place(len(self._people), self._spacing_m)
         if aside or behind:
             self._recording.log(root, rr.Transform3D(translation=(aside, 0.0, behind)), static=True)
@@ -179,7 +187,8 @@ class RerunView:
                 log_name(self._recording, one.root, name)
         roots = {name: one.root for name, one in self._people.items()}
         chests = [one.chest for one in self._people.values()]
-        self._recording.send_blueprint(blueprint_of(roots, chests, self._followed(root), whole=self._whole))
+        layout = blueprint_of(roots, chests, self._followed(root), whole=self._whole, stage=self._stage)
+        self._recording.send_blueprint(layout)
         return person
 
 

@@ -16,6 +16,7 @@ from arm_ik_service.errors import DecodeError, SettingsError
 from arm_ik_service.io.recording import RecordingWriter
 from arm_ik_service.io.rerun_view import Overlay, RerunView, Sink, Skin
 from arm_ik_service.io.zenoh_streams import Bus, answer_queries, declare_stream, put_once, subscribe
+from arm_ik_service.programs.elbow_comfort import ElbowComforts
 from arm_ik_service.programs.grab.scene import CUBE_M, RATE_HZ, Moment, Scene
 from arm_ik_service.skeleton import skeleton_of
 from arm_ik_service.wire import codec
@@ -59,6 +60,11 @@ def _pose(pose: Floats) -> Pose:
     return Pose((x, y, z), (qx, qy, qz, qw))
 
 
+def _vector(place: Floats) -> Vector:
+    x, y, z = place.tolist()
+    return (x, y, z)
+
+
 class GrabShow:
     """Runs a scene into sinks, a recording and an open Zenoh session, any of which may be missing."""
 
@@ -83,7 +89,8 @@ class GrabShow:
         self._cube = scene.cube.copy()
         self.refused = 0
         self._skeleton = skeleton_of(self._avatar, scene.figure.profile)
-        self._view = RerunView(*sinks, name="arm-ik grab", skin=skin, show=overlays) if sinks else None
+        comfort = ElbowComforts() if "swivel" in overlays else None
+        self._view = RerunView(*sinks, name="arm-ik grab", skin=skin, show=overlays, comfort=comfort) if sinks else None
         self._box = self._view.box("cube", CUBE_M) if self._view else None
         if self._view is not None:
             self._view.describe(self._skeleton)
@@ -173,6 +180,9 @@ class GrabShow:
             self._writer.write_arms(self._avatar, moment.arms, moment.arms.receive_time_ns)
             self._writer.write_pose(self._cube_key, _pose(moment.cube), moment.arms.receive_time_ns)
         if self._view is not None and self._box is not None:
+            if count == 0:
+                places = [moment.cube[:3]] if self._scene.goal is None else [moment.cube[:3], self._scene.goal]
+                self._view.stage([moment.arms.chest.position, *(_vector(place) for place in places)])
             self._view.add(moment.arms, moment.frame)
             self._box.add(moment.arms.seq, moment.arms.sample_time_ns, moment.cube)
             if self._legs is not None:

@@ -227,7 +227,8 @@ class Scene:
     def _reached_for(self) -> Floats:
         """World pose (7,) of the hand that holds the cube where it is, or at the goal.
 
-        The wrist is where it has to be for the hand as it is turned, which limits may keep from how it should be.
+        Once it is there it is to be turned as it is, which limits may have kept from how it should be: a solver that is
+        asked for what it cannot give trades millimetres of the place for it, and would never be done.
         """
         placing = self.stage == "place" and self._cube_in_hand is not None
         centre = self._aim() if placing else self.cube[:3]
@@ -236,7 +237,7 @@ class Scene:
         centre_in_hand = PALM_FROM_WRIST - [0.0, 0.5 * CUBE_M, 0.0]
         if placing and self._cube_in_hand is not None:
             centre_in_hand = self._cube_in_hand[:3]
-        return np.concatenate([centre - batch.rotate(turned, centre_in_hand), rotation])
+        return np.concatenate([centre - batch.rotate(turned, centre_in_hand), turned])
 
     def _grasp(self, centre: Floats) -> Floats:
         """Rotation (4,) of a hand whose palm is on the side of a cube there: fingers forward, thumb up."""
