@@ -23,8 +23,9 @@ from arm_ik_service.wire.keys import Keys
 from arm_ik_service.wire.messages import ArmsState, ControllerFrame
 
 REMEMBERED = 32  # frames of an avatar that may wait for their answer
-
-
+# Whoever the state is an answer to is woken by it at the same moment as we are: where processors are few, our work of
+# a millisecond would stand in their way.
+LINGER_S = 0.002
 NICENESS = 10  # halfway to the least: a service and its clients are scheduled first
 
 
@@ -82,7 +83,10 @@ class Exporter:
         try:
             while not self._stopped and (end_s is None or time.monotonic() < end_s):
                 with self._changed:
-                    self._changed.wait_for(lambda: self._newest, timeout=0.1)
+                    if not self._changed.wait_for(lambda: self._newest, timeout=0.1):
+                        continue
+                time.sleep(LINGER_S)
+                with self._changed:
                     arrived, self._newest = self._newest, {}
                 for avatar, payload in arrived.items():
                     self._send(avatar, payload)

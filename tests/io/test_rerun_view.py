@@ -249,6 +249,17 @@ def test_the_eye_goes_along_with_one_person_and_stays_where_it_sees_all_of_many(
     np.testing.assert_allclose(target[[0, 2]], [0.5 * np.ptp(np.array(places)[:, k]) for k in (0, 2)], atol=1e-5)
 
 
+def test_the_eye_stands_still_where_somebody_looks_on(tmp_path: Path) -> None:
+    """Rerun 0.41 goes up close to whom it is told to follow where it has their data already: into the belly."""
+    path = tmp_path / "live.rrd"
+    with RerunView(Save(path)) as view:
+        view.watched = True
+        frame, arms = answer(0)
+        view.add(arms, frame)
+    (eye,) = eyes_of(path)
+    assert not eye.get("tracking_entity")
+
+
 def test_the_eye_stands_still_and_sees_all_of_a_stage(tmp_path: Path) -> None:
     path, places = tmp_path / "stage.rrd", [(0.0, 1.4, 0.0), (0.5, 0.8, -3.0), (1.0, 1.2, -1.6)]
     with RerunView(Save(path)) as view:
@@ -282,10 +293,10 @@ def test_a_live_view_pairs_answers_with_frames_that_come_before_or_after(tmp_pat
 
 def test_a_live_view_pairs_however_much_has_come_at_once(tmp_path: Path) -> None:
     with LiveView(RerunView(Save(tmp_path / "live.rrd")), period_s=3600.0) as live:
-        for frame, arms in map(answer, range(300)):
+        for frame, arms in map(answer, range(900)):  # a second of ten people
             live.offer_frame("ann", frame)
             live.offer_arms(arms)
-    assert (live.shown, live.unpaired, live.dropped) == (300, 0, 0)
+    assert (live.shown, live.unpaired, live.dropped) == (900, 0, 0)
 
 
 def test_a_live_view_that_cannot_keep_up_drops_the_oldest_and_keeps_the_order(tmp_path: Path) -> None:

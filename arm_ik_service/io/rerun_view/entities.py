@@ -21,7 +21,7 @@ from arm_ik_service.wire.messages import SIDES, TRACKING_STATES, VERSION, ArmsSt
 NECK_ROOT = (0.0, 0.065, 0.004)  # top of the torso in the chest frame [m]
 GIRDLE_ROOT = (0.035, 0.014, 0.0)  # of the right side, in the chest frame [m]
 SKULL_BASE = (0.0, -0.075, 0.082)  # in the head frame [m]
-ABOVE_HEAD = (0.0, 0.24, 0.085)  # in the head frame [m]
+ABOVE_HEAD = (0.0, 0.33, 0.085)  # in the head frame [m]
 LINE_RADIUS_M = 0.0035
 BAND_MARGIN = 0.08  # of a joint's range: how far beyond it its plot shows what it cannot do
 BAND_WIDTH = 3.0  # of the lines that fill it, one a frame

@@ -16,6 +16,7 @@ from arm_ik_service.wire.messages import ArmsState, ControllerFrame, Skeleton
 PERIOD_S = 1 / 30  # what arrived in this time is sent together: a third of the calls at 90 Hz, and no eye sees it late
 FILE_PERIOD_S = 1.0  # nobody looks at a file while it is written, and few long pieces make a file of a tenth the size
 CAPACITY = 360  # answers that wait at most, 4 s of one avatar at 90 Hz; beyond it the oldest are dropped
+FILE_CAPACITY = 8192  # the same where nobody looks on: what a hundred people bring in FILE_PERIOD_S
 REMEMBERED = 64  # frames of an avatar that wait on for their answers; one that was overtaken never gets one
 
 
@@ -32,7 +33,7 @@ class LiveView:
         view: RerunView,
         *,
         period_s: float | None = None,
-        capacity: int = CAPACITY,
+        capacity: int | None = None,
         when_gone: Callable[[], None] = lambda: None,
     ) -> None:
         self.shown = 0
@@ -42,6 +43,7 @@ class LiveView:
         self._view = view
         self._when_gone = when_gone
         self._period_s = period_s or (PERIOD_S if view.watched else FILE_PERIOD_S)
+        capacity = capacity or (CAPACITY if view.watched else FILE_CAPACITY)
         self._lock = Lock()
         self._answers: deque[ArmsState] = deque(maxlen=capacity)
         self._skeletons: list[Skeleton] = []

@@ -165,8 +165,11 @@ class RerunView:
         person.sender.send(rows)
 
     def _followed(self, root: str) -> str | None:
-        """Entity that the eye goes along with: the only person's middle."""
-        if len(self._people) > 1:
+        """Entity that the eye goes along with: the only person's middle.
+
+        Not while somebody looks on: a viewer that is told to follow what it sees already goes up close to it.
+        """
+        if len(self._people) > 1 or self.watched:
             return None
         return f"{root}/legs/right/thigh" if self._legs else f"{root}/chest"
 
