@@ -17,7 +17,7 @@ from arm_ik_service.arm.model import ANGLES, ArmModel
 from arm_ik_service.compiled import Record, compiled
 from arm_ik_service.geometry.scalar import Vector, dot, quaternion, vector
 from arm_ik_service.ik.comfort import COMFORT, discomfort, learn_habit
-from arm_ik_service.ik.swivel import Reach, posture_at, reach_to
+from arm_ik_service.ik.swivel import Reach, reach_to, side_at
 from arm_ik_service.wire.messages import Side
 
 Floats = npt.NDArray[np.float64]
@@ -36,7 +36,7 @@ def _end(
     """How far [rad] one can go from the swivel `start` of least discomfort in the direction of `step`."""
     before = least
     for k in range(SWIVELS // 2):
-        cost = discomfort(comfort, habit, chain, posture_at(reach, rotation, start + (k + 1) * step))
+        cost = discomfort(comfort, habit, chain, reach, rotation, side_at(reach, start + (k + 1) * step))[0]
         if cost > least + COMFORTABLE:
             return (k + (least + COMFORTABLE - before) / (cost - before)) * step
         before = cost
@@ -53,7 +53,7 @@ def comfortable_stretch(
     step = 2.0 * math.pi / SWIVELS
     best, least = 0.0, math.inf
     for k in range(-SWIVELS // 2, SWIVELS // 2):
-        cost = discomfort(comfort, habit, chain, posture_at(reach, rotation, here + k * step))
+        cost = discomfort(comfort, habit, chain, reach, rotation, side_at(reach, here + k * step))[0]
         if cost < least:
             best, least = k * step, cost
     lower = best + _end(comfort, habit, chain, reach, rotation, here + best, -step, least)

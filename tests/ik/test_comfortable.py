@@ -11,7 +11,7 @@ from arm_ik_service.arm.model import ArmModel
 from arm_ik_service.geometry import batch
 from arm_ik_service.ik.comfort import COMFORT, discomfort
 from arm_ik_service.ik.comfortable import COMFORTABLE, SWIVELS, ElbowComfort
-from arm_ik_service.ik.swivel import elbow_swivel, posture_at, reach_to
+from arm_ik_service.ik.swivel import elbow_swivel, reach_to, side_at
 from arm_ik_service.wire.messages import SIDES, Side
 
 Floats = npt.NDArray[np.float64]
@@ -47,7 +47,7 @@ def test_discomfort_is_least_within_the_stretch_and_larger_by_the_bound_at_its_e
         here = elbow_swivel(reach, columns_of(tuple(q[:4].tolist())))
 
         def cost(swivel: float) -> float:
-            return discomfort(comfort, habit, chain, posture_at(reach, rotation, here + sign * swivel))  # noqa: B023
+            return discomfort(comfort, habit, chain, reach, rotation, side_at(reach, here + sign * swivel))[0]  # noqa: B023
 
         around = np.array([cost(swivel) for swivel in np.linspace(-np.pi, np.pi, 721)])
         least = around.min()
