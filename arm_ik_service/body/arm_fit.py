@@ -31,10 +31,8 @@ SEGMENTS = 1.15
 SHOULDER_UP_M, SHOULDER_BACK_M, HALF_WIDTH_M = 0.03, 0.05, 0.015  # trunks turn and lean into a reach
 ARM_LENGTH_PART = 0.1  # skeletons of mocap differ by so much, people by half of it
 LOG_SEGMENTS = 0.06  # of upper arm over forearm
-LEAST_ERROR_M, ERROR_PER_RESIDUAL = (
-    0.05,
-    1.5,
-)  # of an equation: what makes residuals large is no noise that averages out
+LEAST_ERROR_M = 0.05  # of an equation
+ERROR_PER_RESIDUAL = 1.5  # more where residuals are large: what makes them so is no noise that averages out
 INDEPENDENT_PER_S, MOST_INDEPENDENT = 6.0, 60.0  # equations that a recording is worth: errors last, and repeat
 MOST_EQUATIONS = 1200
 REACH_PERCENTILE, REACH_ERROR_M = 99.0, 0.01

@@ -19,11 +19,7 @@ import math
 
 from arm_ik_service.arm import tangent
 from arm_ik_service.arm.chain import Columns, columns_of, wrist_at
-from arm_ik_service.arm.configuration import (
-    integrate,
-    read_configuration,
-    store_configuration,
-)
+from arm_ik_service.arm.configuration import integrate, read_configuration, store_configuration
 from arm_ik_service.arm.tangent import Tangent
 from arm_ik_service.compiled import Record, compiled, inlined
 from arm_ik_service.geometry.scalar import Vector, clip, components, norm, scale, subtract, wrap
@@ -32,11 +28,7 @@ from arm_ik_service.ik.clock import monotonic_ns
 from arm_ik_service.ik.comfort import discomfort, learn_habit
 from arm_ik_service.ik.conjugate import NEAREST, OUT_OF_TIME, SOLVED, converge
 from arm_ik_service.ik.held import rests, walls_at
-from arm_ik_service.ik.jacobian import (
-    NO_WRENCH,
-    read_wrench,
-    store_wrench,
-)
+from arm_ik_service.ik.jacobian import NO_WRENCH, read_wrench, store_wrench
 from arm_ik_service.ik.swivel import (
     Reach,
     elbow_side,
@@ -68,7 +60,7 @@ _BETTER = 0.5  # a new start must at least halve the error: no alternation betwe
 
 @inlined
 def towards_comfort(arm: Record, settings: Record, reach: Reach, rotation: Columns, dt_s: float) -> Tangent:
-    """Swing the arm about the line from shoulder to wrist towards less discomfort, within the speed bound."""
+    """Return the motion about the line from shoulder to wrist towards less discomfort, within the speed bound."""
     chain, q = arm.chain, arm.configuration
     upper_arm = columns_of((q[0], q[1], q[2], q[3]))
     side = elbow_side(reach, upper_arm)

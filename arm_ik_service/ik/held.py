@@ -85,10 +85,13 @@ def project(w: Vector, normal: Vector, inverse: Vector) -> Vector:
 
 
 @inlined
-def _independent(normal: Vector, of: Vector, inverse: Vector) -> Vector:
-    """Part of `normal` whose projection leaves the projection along `of` alone."""
-    n = times(inverse, of)
-    return subtract(normal, scale(dot(normal, n) / dot(of, n), of))
+def _project_twist(w: Vector, walls: Walls, inverse: Vector, swing_held: int) -> Vector:
+    """Remove what moves along the twist's wall; if the swing's is held too, without undoing that."""
+    normal = walls.twist
+    if swing_held:
+        n = times(inverse, walls.swing)
+        normal = subtract(normal, scale(dot(normal, n) / dot(walls.swing, n), walls.swing))
+    return project(w, normal, inverse)
 
 
 @inlined
@@ -99,18 +102,18 @@ def hold(walls: Walls, step: Tangent, inverse: Tangent) -> tuple[Tangent, int]:
         w = project(w, walls.swing, inverse[0])
         held |= 1
     if dot(walls.twist, w) > 0.0:
-        w = project(w, _independent(walls.twist, walls.swing, inverse[0]) if held else walls.twist, inverse[0])
+        w = _project_twist(w, walls, inverse[0], held)
         held |= 2
-    elbow, at_elbow = _hold_group(walls.elbow, step[1])
-    wrist, at_wrist = _hold_group(walls.wrist, step[2])
-    return (w, elbow, wrist), held | at_elbow << 2 | at_wrist << 5
+    at_elbow, at_wrist = _blocked(walls.elbow, step[1]), _blocked(walls.wrist, step[2])
+    free = w, _lock_group(step[1], at_elbow), _lock_group(step[2], at_wrist)
+    return free, held | at_elbow << 2 | at_wrist << 5
 
 
 @inlined
-def _hold_group(walls: Vector, t: Vector) -> tuple[Vector, int]:
-    a, b, c = walls[0] * t[0] > 0.0, walls[1] * t[1] > 0.0, walls[2] * t[2] > 0.0
-    free = (0.0 if a else t[0], 0.0 if b else t[1], 0.0 if c else t[2])
-    return free, (1 if a else 0) | (2 if b else 0) | (4 if c else 0)
+def _blocked(walls: Vector, t: Vector) -> int:
+    return (
+        (1 if walls[0] * t[0] > 0.0 else 0) | (2 if walls[1] * t[1] > 0.0 else 0) | (4 if walls[2] * t[2] > 0.0 else 0)
+    )
 
 
 @inlined
@@ -120,7 +123,7 @@ def lock(walls: Walls, step: Tangent, inverse: Tangent, locked: int) -> Tangent:
     if locked & 1:
         w = project(w, walls.swing, inverse[0])
     if locked & 2:
-        w = project(w, _independent(walls.twist, walls.swing, inverse[0]) if locked & 1 else walls.twist, inverse[0])
+        w = _project_twist(w, walls, inverse[0], locked & 1)
     return w, _lock_group(step[1], locked >> 2), _lock_group(step[2], locked >> 5)
 
 

@@ -17,7 +17,7 @@ from arm_ik_service.arm.chain import (
     spin_to_arm,
 )
 from arm_ik_service.arm.configuration import difference, integrate, read_configuration, store_configuration
-from arm_ik_service.arm.limits import swing_excess, twist_excess, twist_of
+from arm_ik_service.arm.limits import swing_excess, swing_surely_inside, twist_excess, twist_of
 from arm_ik_service.compiled import Record, compiled
 from arm_ik_service.geometry.scalar import clip, quaternion, scale, store, vector
 from arm_ik_service.ik.conjugate import SOLVED
@@ -99,7 +99,8 @@ def limits_at(chain: Record, configuration: Any) -> int:
     """Bit mask over arm.model.LIMITS of the limits that a configuration (10,) rests on."""
     bone = columns_of((configuration[0], configuration[1], configuration[2], configuration[3]))
     twist, height = twist_of(bone), -bone[1][1]
-    mask = 1 if swing_excess(chain, scale(-1.0, bone[1])) > -RESTS_RAD else 0
+    inside = swing_surely_inside(chain, bone)
+    mask = 1 if not inside and swing_excess(chain, scale(-1.0, bone[1])) > -RESTS_RAD else 0
     if twist_excess(chain, twist + RESTS_RAD, height) > 0.0 or twist_excess(chain, twist - RESTS_RAD, height) < 0.0:
         mask |= 2
     for i in range(6):
