@@ -18,23 +18,73 @@ from typing import Any, TypeVar, cast
 
 import numba
 import numpy as np
+from filelock import FileLock
+from numba.core.registry import CPUDispatcher
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 Record = Any  # a numpy record: attribute access in compiled code and, as `np.record`, in plain Python too
 
 
-def compiled(function: Function, *, inline: bool = False) -> Function:
+class _Inner(CPUDispatcher):
+    def __call__(self, *arguments: Any) -> Any:
+        return self.py_func(*arguments)
+
+
+def compiled(function: Function) -> Function:
     """Compile `function` with numba on first use: cached on disk, GIL released, IEEE division as numpy does it."""
-    dispatcher = numba.njit(cache=True, nogil=True, error_model="numpy", forceinline=inline)(function)
-    with suppress(AttributeError):  # plain Python under NUMBA_DISABLE_JIT; a private name, should numba rename it
-        index = cast(Any, dispatcher)._cache._cache_file
-        index._source_stamp = (index._source_stamp, _sources())
-    return cast(Function, dispatcher)
+    return cast(Function, _cached(numba.jit(cache=True, **_options())(function)))
+
+
+def inner(function: Function, *, inline: bool = False) -> Function:
+    """Compile `function` only as part of others: from Python it runs as Python.
+
+    The entry from Python that numba compiles for every other function is a quarter of the time of a first start.
+    """
+    if cast(Any, numba.config).DISABLE_JIT:
+        return function
+    dispatcher = _Inner(function, targetoptions=_options(inner=True, inline=inline))
+    dispatcher.enable_caching()
+    return cast(Function, _cached(dispatcher))
 
 
 def inlined(function: Function) -> Function:
     """Compile `function` into whatever calls it: for small ones of the hot loop, so that tuples stay in registers."""
-    return compiled(function, inline=True)
+    return inner(function, inline=True)
+
+
+def _options(*, inner: bool = False, inline: bool = False) -> dict[str, Any]:
+    """Return numba's options, none left out: a function inherits those from whoever happens to call it first."""
+    return {
+        "nopython": True,
+        "nogil": True,
+        "error_model": "numpy",
+        "forceinline": inline,
+        "no_cpython_wrapper": inner,
+        "no_cfunc_wrapper": True,
+    }
+
+
+def _cached(dispatcher: Any) -> Any:
+    """Tell a dispatcher's cache of all sources, and let several processes share it."""
+    with suppress(AttributeError):  # plain Python under NUMBA_DISABLE_JIT; a private name, should numba rename it
+        index = dispatcher._cache._cache_file
+        index._source_stamp = (index._source_stamp, _sources())
+        _one_at_a_time(index)
+    return dispatcher
+
+
+def _one_at_a_time(index: Any) -> None:
+    """Let several processes fill one cache: without a lock two that save at once can take the same file name."""
+    lock = FileLock(Path(index._cache_path) / "arm_ik_service.lock", is_singleton=True)
+
+    def locked(function: Callable[..., Any]) -> Callable[..., Any]:
+        def call(*arguments: Any) -> Any:
+            with lock:
+                return function(*arguments)
+
+        return call
+
+    index.save, index.load = locked(index.save), locked(index.load)
 
 
 @cache

@@ -35,6 +35,7 @@ EVERYTHING = {"programs", "bench", "cli", "__init__", "__main__"}  # these put t
 # a library that only one kind of module may import
 OWNERS: dict[str, str | tuple[str, ...]] = {
     "zenoh": "io.zenoh_",
+    "filelock": "compiled",
     "rerun": "io.rerun_view",
     "mcap": ("io.recording", "exports.mcap_files"),
     "pinocchio": ("arm.", "ik.", "bench.peers"),

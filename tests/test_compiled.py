@@ -9,6 +9,8 @@ import sys
 from pathlib import Path
 
 import arm_ik_service
+from arm_ik_service.compiled import compiled, inlined
+from arm_ik_service.geometry.scalar import Vector, add, cross
 
 PROGRAM = (
     "from arm_ik_service.arm.model import ArmModel; print(ArmModel.load().forward(ArmModel.load().rest)['wrist'][1])"
@@ -40,3 +42,32 @@ def test_an_edit_in_a_function_that_another_file_calls_is_seen(tmp_path: Path) -
     assert edited != source
     scalar.write_text(edited)
     assert wrist_height() != first
+
+
+@inlined
+def _twice(a: Vector) -> Vector:
+    return add(a, a)
+
+
+@compiled
+def _sixfold(a: Vector) -> Vector:
+    return _twice(add(_twice(a), a))
+
+
+def test_what_exists_only_inside_compiled_functions_runs_as_python_from_python() -> None:
+    a = (1.0, -2.0, 3.0)
+    assert _sixfold(a) == (6.0, -12.0, 18.0)
+    assert _twice(a) == (2.0, -4.0, 6.0)
+    assert cross([1, 0, 0], [0, 1, 0]) == (0, 0, 1), "integers, as no compiled entry would leave them"  # type: ignore[arg-type]
+
+
+def test_processes_that_start_together_fill_one_cache_and_agree(tmp_path: Path) -> None:
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+
+    def start() -> subprocess.Popen[str]:
+        return subprocess.Popen([sys.executable, "-c", PROGRAM], stdout=subprocess.PIPE, text=True, env=environment)
+
+    together = [start() for _ in range(2)]
+    heights = {process.communicate()[0] for process in [*together, start()]}
+    assert len(heights) == 1
+    assert float(heights.pop()) < 0.0

@@ -19,9 +19,9 @@ from arm_ik_service.ik.solver import Counts
 
 Array = npt.NDArray[np.float64]
 
-# A compiled frame costs less than the call of `track` around it: it is timed this many frames at once, which its users
-# do not notice but its p99 does, being one of blocks.
-COMPILED_BLOCK = 64
+# A compiled frame costs less than the call of `track` around it, and `track` carries the hand's motion on from frame to
+# frame: it is timed this many frames at once, as its users call it. Its p99 is therefore one of blocks.
+COMPILED_BLOCK = 500
 
 
 class Tolerances(NamedTuple):

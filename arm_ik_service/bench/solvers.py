@@ -19,7 +19,7 @@ from arm_ik_service.bench.arm_tasks import ArmTask
 from arm_ik_service.bench.contender import Contender, Tolerances, first_posture
 from arm_ik_service.bench.measures import ArmResult, Summary, evaluate, recorded, summarise
 
-CHUNK = 64  # frames between two looks at whether somebody wants to stop
+CHUNK = 64  # frames at least between two looks at whether somebody wants to stop
 RECORDED = "recorded"
 
 Progress = Callable[[str, int], None]
@@ -122,10 +122,10 @@ def _measure(
     contender.begin(task._replace(targets=task.targets[:block]), tolerances, start).advance(0, min(block, count))
     run = contender.begin(task, tolerances, start)
     microseconds: list[float] = []
-    for first in range(0, count, CHUNK):
+    for first in range(0, count, max(CHUNK, block)):
         if stopped():
             return None
-        last = min(first + CHUNK, count)
+        last = min(first + max(CHUNK, block), count)
         with _no_garbage_collection():
             for at in range(first, last, block):
                 end = min(at + block, last)

@@ -12,7 +12,7 @@ from arm_ik_service.body.learning import EYES_PER_STATURE, STANDING_EYES_M
 from arm_ik_service.body.profile import Profile
 from arm_ik_service.body.state import BODY
 from arm_ik_service.body.step import initialise_body, step_body
-from arm_ik_service.compiled import compiled, record_dtype
+from arm_ik_service.compiled import inner, record_dtype
 from arm_ik_service.geometry import batch
 from arm_ik_service.geometry import scalar as g
 from arm_ik_service.settings import BodySettings, TrackingSettings, to_record
@@ -66,7 +66,7 @@ _SEEN = record_dtype(
 )
 
 
-@compiled
+@inner
 def _all_seen(tracking: Any) -> bool:
     seen = tracking.head.position_age_s == 0.0 and tracking.head.rotation_age_s == 0.0
     for k in range(2):
@@ -75,7 +75,7 @@ def _all_seen(tracking: Any) -> bool:
     return bool(seen)
 
 
-@compiled
+@inner
 def _note(seen: Any, tracking: Any, body: Any) -> None:
     seen.t = 1e-9 * tracking.sample_time_ns
     seen.eye_height_m = tracking.head.position[1]
@@ -87,7 +87,7 @@ def _note(seen: Any, tracking: Any, body: Any) -> None:
         seen.wrists[k, :3], seen.wrists[k, 3:] = wrist.position, wrist.rotation
 
 
-@compiled
+@inner
 def _observe(tracking: Any, body: Any, frames: Any, seen: Any, tracking_settings: Any, body_settings: Any) -> int:
     """Fill `seen` with the frames in which everything was seen; how many they are."""
     count = 0

@@ -21,7 +21,7 @@ from arm_ik_service.arm import tangent
 from arm_ik_service.arm.chain import Columns, columns_of, wrist_at
 from arm_ik_service.arm.configuration import integrate, read_configuration, store_configuration
 from arm_ik_service.arm.tangent import Tangent
-from arm_ik_service.compiled import Record, compiled, inlined
+from arm_ik_service.compiled import Record, compiled, inlined, inner
 from arm_ik_service.geometry.scalar import Vector, clip, components, norm, scale, subtract, wrap
 from arm_ik_service.geometry.trigonometry import angle_of
 from arm_ik_service.ik.clock import monotonic_ns
@@ -270,7 +270,7 @@ def _finished(status: int) -> bool:
     return status in (SOLVED, OUT_OF_TIME)
 
 
-@compiled
+@inner
 def _start_again(
     arm: Record,
     settings: Record,
@@ -307,22 +307,26 @@ def _start_again(
 
 
 @compiled
-def hold_elbow(arm: Record, settings: Record, position: Vector, rotation: Columns, reach: Reach) -> None:
-    """Step 6: where the elbow has gone too far from `arm.anchor`, turn it only part of the way, in closed form."""
+def hold_elbow(arm: Record, settings: Record, position: Vector, rotation: Columns, reach: Reach) -> bool:
+    """Step 6: where the elbow has gone too far from `arm.anchor`, turn it only part of the way, in closed form.
+
+    Returns whether it was free to go as far as it went.
+    """
     chain, q, anchor = arm.chain, arm.configuration, arm.anchor
     upper_arm = columns_of((anchor[0], anchor[1], anchor[2], anchor[3]))
     moved = subtract(columns_of((q[0], q[1], q[2], q[3]))[1], upper_arm[1])
     step_m = chain.upper_arm_m * norm(moved)
     if step_m <= ELBOW_STEP_M:
-        return
+        return True
     allowed_m = ELBOW_STEP_M + norm(subtract(position, wrist_at(chain, anchor)))
     if step_m <= allowed_m:
-        return
+        return True
     before = elbow_swivel(reach, upper_arm)
     turn = wrap(elbow_swivel(reach, columns_of((q[0], q[1], q[2], q[3]))) - before)
     most = ELBOW_STEP_M / max(reach[2] * chain.upper_arm_m, 1e-3)
     swivel = before + clip(turn, -most, most)
     arm.work.iterations = reach_with_any_rotation(arm, settings, position, rotation, reach, swivel, arm.work.iterations)
+    return False
 
 
 @inlined
@@ -367,9 +371,9 @@ def step_frame(arm: Record, settings: Record, asked: Vector, rotation: Columns, 
         # The target's distance tells the elbow's flexion; a straight arm could not tell the loop the way back.
         arm.configuration[4] = min(angle_of(reach[3], reach[4]), arm.chain.upper[0])
         follow_target(arm, settings, position, rotation, reach)
-        free = arm.status == SOLVED and arm.work.held == 0 and arm.restarted == 0
-        arm.steady, arm.frame_s = arm.steady + 1 if free else 0, dt_s
-    hold_elbow(arm, settings, position, rotation, reach)
+    moved_freely = hold_elbow(arm, settings, position, rotation, reach)
+    moved_freely = moved_freely and arm.status == SOLVED and arm.work.held == 0 and arm.restarted == 0
+    arm.steady, arm.frame_s = arm.steady + 1 if moved_freely else 0, dt_s
     report_error(arm, asked, position)
     learn_habit(arm.habit, arm.configuration, dt_s)
 

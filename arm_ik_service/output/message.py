@@ -14,7 +14,7 @@ import msgspec
 import numpy as np
 
 from arm_ik_service.arm.model import LIMITS
-from arm_ik_service.compiled import compiled
+from arm_ik_service.compiled import compiled, inner
 from arm_ik_service.output.record import OUTPUT
 from arm_ik_service.wire import codec
 from arm_ik_service.wire.messages import (
@@ -190,14 +190,14 @@ def write_body(numbers: Any, literals: Any, steps: Any, out: Any) -> int:
     return at
 
 
-@compiled
+@inner
 def _write_number(out: Any, at: int, number: int, size: int) -> int:
     for i in range(size):
         out[at + i] = number >> 8 * (size - 1 - i) & 0xFF
     return at + size
 
 
-@compiled
+@inner
 def _write_count(out: Any, at: int, number: int) -> int:
     """Write a whole number in the shortest of its forms, as msgspec does."""
     if number < 0x80:

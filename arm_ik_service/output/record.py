@@ -69,11 +69,11 @@ def write_output(out: Record, tracking: Record, body: Record, arms: Any) -> None
         written.orientation_error_rad = g.norm(
             g.log(g.multiply(g.conjugate(g.quaternion(asked.rotation)), hand_rotation))
         )
-        written.configuration[:] = arm.published
-        written.velocity[:] = arm.velocity
-        written.angles[:] = arm.angles
-        written.angle_rates[:] = arm.angle_rates
-        written.isb[:] = arm.isb
+        g.store(written.configuration, arm.published)
+        g.store(written.velocity, arm.velocity)
+        g.store(written.angles, arm.angles)
+        g.store(written.angle_rates, arm.angle_rates)
+        g.store(written.isb, arm.isb)
         written.isb_singular = arm.isb_singular
         written.reach_ratio = body.reach_ratio[side]
         written.elbow_confidence = arm.elbow_confidence
