@@ -79,8 +79,8 @@ def most_carried(steps: list[Step]) -> int:
 
 
 @contextmanager
-def serving(kind: str) -> Iterator[Bus]:
-    """Run the service, or the empty one, with room for everybody, and yield a client's session."""
+def serving(kind: str) -> Iterator[tuple[Bus, str]]:
+    """Run the service, or the empty one, with room for everybody; yield a client's session and where it connects."""
     endpoint = free_endpoint()
     with tempfile.TemporaryDirectory() as folder:
         settings = Path(folder) / "settings.toml"
@@ -89,12 +89,12 @@ def serving(kind: str) -> Iterator[Bus]:
         if kind == "empty":
             arguments = ["arm_ik_service.bench.empty_service", endpoint, str(MAX_AVATARS)]
         with part(*arguments), open_client(BusOptions(connect=(endpoint,)), wait_s=10.0) as bus:
-            yield bus
+            yield bus, endpoint
 
 
-def load(bus: Bus, avatars: int, rate_hz: float, seconds: float) -> Step:
+def load(bus: Bus, endpoint: str, avatars: int, rate_hz: float, seconds: float) -> Step:
     """Load an open service with so many people for so long."""
-    people = Load(bus, avatars, rate_hz, WARM_UP_S + seconds)
+    people = Load(bus, (endpoint,), avatars, rate_hz, WARM_UP_S + seconds)
     try:
         people.run()
     finally:
@@ -119,18 +119,20 @@ def measure_capacity(*, rate_hz: float, seconds: float, progress: Progress | Non
     ramps: dict[str, list[Step]] = {"service": [], "empty": []}
     overload = None
     for kind, steps in ramps.items():
-        with serving(kind) as bus:
+        with serving(kind) as (bus, endpoint):
             for avatars in range(FIRST, LAST + 1, STEP):
-                step = load(bus, avatars, rate_hz, seconds)
+                step = load(bus, endpoint, avatars, rate_hz, seconds)
                 if not step.carried:
-                    step = load(bus, avatars, rate_hz, seconds)  # once more: the machine may have done something else
+                    step = load(
+                        bus, endpoint, avatars, rate_hz, seconds
+                    )  # once more: the machine may have done something else
                 steps.append(step)
                 if progress is not None:
                     progress(kind, step.measured)
                 if not step.carried:
                     break
             if kind == "service" and most_carried(steps):
-                overload = load(bus, 2 * most_carried(steps), rate_hz, seconds)
+                overload = load(bus, endpoint, 2 * most_carried(steps), rate_hz, seconds)
                 if progress is not None:
                     progress("twice", overload.measured)
     return Capacity(rate_hz, ramps["service"], ramps["empty"], overload)

@@ -90,7 +90,8 @@ def measure_failover(
         # a peer of both: the link to the one stands whatever becomes of the other
         options = BusOptions(connect=tuple(pair.endpoints), listen=(free_endpoint(),))
         bus = stack.enter_context(open_client(options, wait_s=10.0))
-        people = Load(bus, avatars, rate_hz, MOST_S)
+        people = Load(bus, tuple(pair.endpoints), avatars, rate_hz, MOST_S, peer=True)
+        stack.callback(people.close)
 
         def disturb() -> None:
             nonlocal came_back_s
@@ -106,7 +107,6 @@ def measure_failover(
         helper.start()
         people.run(progress=progress)
         helper.join()
-        people.close()
     settled_s = came_back_s + SETTLING_S
     # a service tells its people once a second, and once more when it ends: of the last two seconds the last word counts
     last = {health.service: health for health in people.healths}

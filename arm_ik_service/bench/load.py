@@ -1,28 +1,29 @@
-"""Many people at once on one session: sends their frames, takes their answers, and keeps every time in between."""
+"""Many people at once: a process that sends their frames, and here their answers, with every time in between."""
 
 from __future__ import annotations
 
 import gc
+import tempfile
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from arm_ik_service.bench.people import moving
+from arm_ik_service.bench.processes import Part
+from arm_ik_service.bench.sender import name_of
 from arm_ik_service.errors import WireError
-from arm_ik_service.io.zenoh_streams import Bus, declare_stream, has_listener, subscribe
+from arm_ik_service.io.zenoh_streams import Bus, subscribe
 from arm_ik_service.wire import codec
 from arm_ik_service.wire.keys import Keys
 from arm_ik_service.wire.messages import Health
 
-TICK_S = 0.001  # frames that are due within it go out together: to sleep for each would load the machine itself
 ANSWERED_WITHIN_S = 0.3
-LISTENED_WITHIN_S = 5.0
-CATCH_UP = 0.25  # of a period: after a stall frames follow no closer, or the newest would overtake the rest
+BEGINS_IN_NS = 50_000_000
 
 
 class Stamps(msgspec.Struct):
@@ -51,21 +52,33 @@ class Measured(NamedTuple):
     client_p99_ms: float
     client_max_ms: float
     doubles: int  # answers to a frame that had one
+    way_in_p99_ms: float = 0.0  # put to receive, and
+    way_out_p99_ms: float = 0.0  # publish to callback: Zenoh, the network, and whoever waits for a processor
 
 
 class Load:
     """People who all wave, evenly shifted within a period."""
 
-    def __init__(self, bus: Bus, avatars: int, rate_hz: float, seconds: float, keys: Keys | None = None) -> None:
+    def __init__(
+        self,
+        bus: Bus,
+        endpoints: tuple[str, ...],
+        avatars: int,
+        rate_hz: float,
+        seconds: float,
+        *,
+        keys: Keys | None = None,
+        peer: bool = False,
+    ) -> None:
+        """Hear on `bus`; the sender connects to `endpoints`, as a client of one or as a peer of all of them."""
         keys = keys or Keys()
-        self._rate_hz = rate_hz
-        self._frames = max(1, int(seconds * rate_hz))
-        self.names = [f"person-{n:03d}" for n in range(avatars)]
+        frames = max(1, int(seconds * rate_hz))
+        self._frames = frames
+        self.names = [name_of(n) for n in range(avatars)]
         self._index = {keys.arms(name): n for n, name in enumerate(self.names)}
-        self._streams = [declare_stream(bus, keys.controllers(name), "msgpack") for name in self.names]
-        self._put_ns: Times = np.zeros((avatars, self._frames), np.int64)
-        self._come_ns: Times = np.zeros((avatars, self._frames), np.int64)
-        self._in_service_ns: Times = np.zeros((avatars, self._frames), np.int64)
+        self._come_ns: Times = np.zeros((avatars, frames), np.int64)
+        self._receive_ns: Times = np.zeros((avatars, frames), np.int64)
+        self._publish_ns: Times = np.zeros((avatars, frames), np.int64)
         self._doubles: list[int] = []  # when they came
         self.healths: list[Health] = []
         self.began_ns = 0
@@ -74,6 +87,11 @@ class Load:
             subscribe(bus, keys.arms(), self._receive),
             subscribe(bus, keys.health(), self._receive_health),
         ]
+        self._folder = tempfile.TemporaryDirectory()
+        file = Path(self._folder.name) / "put_ns"
+        self._put_ns: Times = np.memmap(file, np.int64, mode="w+", shape=(avatars, frames))
+        arguments = (str(file), str(avatars), str(rate_hz), str(frames), keys.prefix, "peer" if peer else "hub")
+        self._sender = Part("arm_ik_service.bench.sender", *arguments, *endpoints)
 
     def _receive(self, key: str, payload: bytes, _time_ns: int) -> None:
         now_ns = time.monotonic_ns()
@@ -85,7 +103,8 @@ class Load:
             self._doubles.append(now_ns)
             return
         self._come_ns[row, stamps.seq] = now_ns
-        self._in_service_ns[row, stamps.seq] = stamps.publish_time_ns - stamps.receive_time_ns
+        self._receive_ns[row, stamps.seq] = stamps.receive_time_ns
+        self._publish_ns[row, stamps.seq] = stamps.publish_time_ns
 
     def _receive_health(self, _key: str, payload: bytes, _time_ns: int) -> None:
         with suppress(WireError):  # of another version: its answers are measured all the same
@@ -101,47 +120,37 @@ class Load:
         self._stopped = True
 
     def run(self, *, progress: Callable[[int], None] | None = None) -> None:
-        """Send it all, and wait a moment for the last answers."""
-        give_up_s = time.monotonic() + LISTENED_WITHIN_S
-        while not has_listener(self._streams[0]) and time.monotonic() < give_up_s:
-            time.sleep(0.01)
-        count = len(self._streams)
-        period_s = 1.0 / self._rate_hz
+        """Send it all, and wait a moment for the last answers. Raises ArmIkError where the sender cannot."""
+        self._sender.wait_ready()
+        popen = self._sender.popen
+        assert popen.stdin is not None
         gc.collect()
         gc.disable()
         try:
-            start_s = time.monotonic() + 0.01
-            self.began_ns = int(start_s * 1e9)
-            for seq in range(self._frames):
-                if self._stopped:
-                    break
-                payload = codec.encode(moving(seq, self._rate_hz))
-                at_s = start_s + seq * period_s
-                late_s = time.monotonic() - at_s
-                if late_s > period_s:  # this machine stalled: what was missed is not sent in one burst
-                    start_s += late_s - CATCH_UP * period_s
-                    at_s = start_s + seq * period_s
-                done = 0
-                while done < count:
-                    due = min(count, 1 + int((time.monotonic() - at_s) / period_s * count))
-                    for row in range(done, due):
-                        self._put_ns[row, seq] = time.monotonic_ns()
-                        self._streams[row].put(payload)
-                    done = max(done, due)
-                    if done < count:
-                        time.sleep(TICK_S)
+            began_ns = time.monotonic_ns() + BEGINS_IN_NS
+            popen.stdin.write(f"{began_ns}\n")
+            popen.stdin.flush()
+            self.began_ns = began_ns
+            done = 0
+            while popen.poll() is None and not self._stopped:
+                time.sleep(0.05)
                 if progress is not None:
-                    progress(count)
+                    sent = int(np.count_nonzero(self._put_ns[-1]))
+                    progress((sent - done) * len(self.names))
+                    done = sent
+            popen.stdin.close()
+            popen.wait()
+            time.sleep(ANSWERED_WITHIN_S)
         finally:
             gc.enable()
-        time.sleep(ANSWERED_WITHIN_S)
 
     def close(self) -> None:
         """Send and hear no more."""
+        self._sender.end()
         for subscriber in self._subscribers:
             subscriber.undeclare()
-        for stream in self._streams:
-            stream.undeclare()
+        self._put_ns = np.array(self._put_ns)
+        self._folder.cleanup()
 
     def measured(self, from_s: float = 0.0, to_s: float = float("inf")) -> Measured:
         """Return what became of the frames sent in a span after the beginning [s]."""
@@ -149,7 +158,10 @@ class Load:
         answered = sent & (self._come_ns > 0)
         shares = answered.sum(axis=1) / np.maximum(sent.sum(axis=1), 1)
         client_ms = (self._come_ns - self._put_ns)[answered] / 1e6
-        service_ms = self._in_service_ns[answered] / 1e6
+        service_ms = (self._publish_ns - self._receive_ns)[answered] / 1e6
+        set_ns = time.time_ns() - time.monotonic_ns()  # the service stamps by the wall clock
+        in_ms = (self._receive_ns - set_ns - self._put_ns)[answered] / 1e6
+        out_ms = (self._come_ns + set_ns - self._publish_ns)[answered] / 1e6
         begin_ns = self.began_ns + from_s * 1e9
         service_p50, service_p99 = _percentiles(service_ms, 50, 99)
         client_p50, client_p99, client_max = _percentiles(client_ms, 50, 99, 100)
@@ -164,6 +176,8 @@ class Load:
             client_p50_ms=client_p50,
             client_p99_ms=client_p99,
             client_max_ms=client_max,
+            way_in_p99_ms=_percentiles(in_ms, 99)[0],
+            way_out_p99_ms=_percentiles(out_ms, 99)[0],
             doubles=sum(begin_ns <= at_ns < self.began_ns + to_s * 1e9 for at_ns in self._doubles),
         )
 

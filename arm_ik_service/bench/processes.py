@@ -85,6 +85,12 @@ def part(module: str, *arguments: str) -> Iterator[Part]:
         running.end()
 
 
+def say_ready() -> None:
+    """Tell, from a part, whoever started it."""
+    sys.stderr.write("ready\n")
+    sys.stderr.flush()
+
+
 def wait_for_end() -> None:
     """Wait, in a part, until it is asked to end or whoever started it is gone."""
     ended = Event()
@@ -96,6 +102,5 @@ def wait_for_end() -> None:
         ended.set()
 
     Thread(target=watch, daemon=True).start()
-    sys.stderr.write("ready\n")
-    sys.stderr.flush()
+    say_ready()
     ended.wait()

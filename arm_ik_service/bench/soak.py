@@ -26,8 +26,8 @@ class Soak(NamedTuple):
 
 def measure_soak(*, avatars: int, rate_hz: float, seconds: float) -> Soak:
     """Load one service with so many people for so long."""
-    with serving("service") as bus:
-        people = Load(bus, avatars, rate_hz, seconds)
+    with serving("service") as (bus, endpoint):
+        people = Load(bus, (endpoint,), avatars, rate_hz, seconds)
         people.run()
         people.close()
     settling_s = min(SETTLING_S, seconds / 3.0)

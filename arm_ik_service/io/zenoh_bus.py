@@ -28,6 +28,11 @@ KEEP_ALIVES_PER_LEASE = 4
 _PEERS_MS = 300
 _RETRY = {"period_init_ms": 200, "period_max_ms": 1000, "period_increase_factor": 1.5}
 
+# What may wait on a client's side for the network. Systems let 4 MB wait, which are old poses in front of the door
+# where the newest wins: under overload a third of a second of them, measured. What finds no room the client drops.
+# A hub's receive buffer is left alone: one so small makes TCP drop segments, and wait for a second to send them again.
+WAITING_BYTES = 32 * 1024
+
 # To close a link that was cut, with data under way, blocks one of Zenoh's receiving threads for up to 10 s (SO_LINGER,
 # eclipse-zenoh/zenoh#1101). Of the default two, one link to each of two lost machines would take both.
 _RUNTIME = "(rx: (worker_threads: 8))"
@@ -93,6 +98,9 @@ def _configuration(options: BusOptions, role: Role) -> zenoh.Config:
         put("transport/link/tx/keep_alive", KEEP_ALIVES_PER_LEASE)
     if options.tls is not None:
         _put_tls(options.tls, put)
+    if options.config_file is None and role == "client":
+        for protocol in ("tcp", "tls"):
+            put(f"transport/link/{protocol}/so_sndbuf", WAITING_BYTES)
     if options.access_file is not None:
         try:
             put("access_control", json.loads(options.access_file.read_bytes()))

@@ -288,6 +288,11 @@ class Inbox:
                 self._ready.put(None)  # for the next `wait`
                 return arrivals
 
+    @property
+    def empty(self) -> bool:
+        """Whether no frame waits."""
+        return not self._slots
+
     def refused_of(self, avatar: str) -> int:
         """Return how many of an avatar's frames were refused here."""
         door = self._doors.get(self._keys.controllers(avatar))

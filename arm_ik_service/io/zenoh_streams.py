@@ -36,6 +36,21 @@ def has_listener(stream: Stream) -> bool:
     return bool(getattr(status, "matching", status))
 
 
+def watch_listeners(stream: Stream, see: Callable[[bool], None]) -> Any:
+    """Call `see(whether anybody listens)` at once and whenever it changes, on Zenoh's network thread: store and return.
+
+    It goes on while the stream and what is returned are held.
+    """
+
+    def changed(status: zenoh.MatchingStatus) -> None:
+        see(status.matching)
+
+    watch = stream.declare_matching_listener(zenoh.handlers.Callback(changed, indirect=False))
+    if has_listener(stream):  # a listener is told of changes only
+        see(True)
+    return watch
+
+
 def put_once(bus: Bus, key: str, payload: bytes, encoding: Encoding, *, waits: bool = True) -> None:
     """Publish something that does not come again soon: it waits for room rather than be dropped, unless told not to."""
     bus.put(

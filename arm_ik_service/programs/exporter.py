@@ -1,8 +1,9 @@
 """Sending live states on in other dialects, in a process of its own: no sink can delay the service.
 
-The process gives way to others where processors are scarce, and between Zenoh's thread and the sinks lies one slot an
-avatar: sinks that are slow get the newest state, not a queue. One process serves several dialects: the service then
-sends every state once, and this process reads it once.
+It watches: states come a moment after whoever waits for them has them. The process gives way to others where processors
+are scarce, and between Zenoh's thread and the sinks lies one slot an avatar: sinks that are slow get the newest state,
+not a queue. One process serves several dialects: the service then sends every state once, and this process reads it
+once.
 """
 
 from __future__ import annotations
@@ -23,9 +24,6 @@ from arm_ik_service.wire.keys import Keys
 from arm_ik_service.wire.messages import ArmsState, ControllerFrame
 
 REMEMBERED = 32  # frames of an avatar that may wait for their answer
-# Whoever the state is an answer to is woken by it at the same moment as we are: where processors are few, our work of
-# a millisecond would stand in their way.
-LINGER_S = 0.002
 NICENESS = 10  # halfway to the least: a service and its clients are scheduled first
 
 
@@ -69,9 +67,9 @@ class Exporter:
         self._changed = Condition()
         self._stopped = False
         self._exported = Exported()
-        self._subscribers = [subscribe(bus, keys.arms(avatar or "*"), self._take_arms)]
+        self._subscribers = [subscribe(bus, keys.watched_arms(avatar or "*"), self._take_arms)]
         if any(sink.wants_frames for sink in sinks):  # each subscriber costs the service's process a copy of the stream
-            self._subscribers.append(subscribe(bus, keys.controllers(avatar or "*"), self._take_frame))
+            self._subscribers.append(subscribe(bus, keys.watched_controllers(avatar or "*"), self._take_frame))
 
     def stop(self) -> None:
         """Make `run` return; safe in a signal handler."""
@@ -85,7 +83,6 @@ class Exporter:
                 with self._changed:
                     if not self._changed.wait_for(lambda: self._newest, timeout=0.1):
                         continue
-                time.sleep(LINGER_S)
                 with self._changed:
                     arrived, self._newest = self._newest, {}
                 for avatar, payload in arrived.items():

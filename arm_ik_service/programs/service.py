@@ -21,6 +21,7 @@ from arm_ik_service.io.zenoh_inbox import Arrival, Inbox, InboxLimits
 from arm_ik_service.io.zenoh_streams import Bus, answer_queries, declare_stream, put_once, subscribe
 from arm_ik_service.programs.fleet import Fleet
 from arm_ik_service.programs.look_out import LookOut, profiles
+from arm_ik_service.programs.onlookers import LINGER_S, Onlookers
 from arm_ik_service.programs.rehearsal import Rehearsal
 from arm_ik_service.programs.seats import Seat
 from arm_ik_service.programs.tally import Tally
@@ -86,6 +87,7 @@ class Service:
             self._fleet.owns,
             self._answer_now,
         )
+        self._onlookers = Onlookers(session, self._keys, limits.encoding, self._inbox.wake)
         self._look_out = LookOut(session, self._keys, limits, self._inbox, self._seats.__contains__)
         self._health = declare_stream(session, self._keys.health(name), limits.encoding)
         self._queryables = [
@@ -132,6 +134,7 @@ class Service:
                     if arrivals:
                         self._answer(arrivals)
                         self._ended_ns = time.perf_counter_ns()
+                    self._onlookers.tell(idle=self._inbox.empty)
                     now_s = time.monotonic()
                     if now_s >= self._look_out.due_s:
                         self._look_out.turn(now_s)
@@ -147,12 +150,14 @@ class Service:
         if self._services_changed:
             return 0.0
         due_s = min(self._health_at_s, self._look_out.due_s) - time.monotonic()
+        quiet_s = (time.perf_counter_ns() - self._ended_ns) / 1e9
+        if quiet_s > SPEAKING_S:
+            return due_s  # whoever begins to speak wakes us
+        if self._onlookers.there:
+            due_s = min(due_s, LINGER_S)
         if self._rehearsal is None:
             return due_s
         every_s = self._limits.rehearse_every_s
-        quiet_s = (time.perf_counter_ns() - self._ended_ns) / 1e9
-        if quiet_s > SPEAKING_S:
-            return due_s  # whoever begins to speak wakes us, and is not known yet
         if quiet_s > every_s:
             self._rehearsal.run()
             return min(due_s, every_s)
@@ -163,14 +168,18 @@ class Service:
         self._inbox.close()
         self._fleet.leave()
         with self._working:
+            self._onlookers.close()
             self._publish_health()
 
     # --- frames
 
     def _answer_now(self, arrival: Arrival) -> bool:
         """Run on a Zenoh thread: answer a known avatar where nobody is at work and no frame was waiting."""
-        if time.perf_counter_ns() - self._ended_ns > BACK_TO_BACK_NS:
+        quiet_ns = time.perf_counter_ns() - self._ended_ns
+        if quiet_ns > BACK_TO_BACK_NS:
             self._back_to_back = 0
+            if quiet_ns > SPEAKING_S * 1e9:
+                return False  # the loop sleeps: it has things to do while somebody speaks
         elif self._back_to_back >= MOST_BACK_TO_BACK:
             return False
         if not self._working.acquire(blocking=False):
@@ -221,6 +230,9 @@ class Service:
             )
             seat.publisher.put(payload)
             self._tally.answered(seat, payload, publish_time_ns - arrival.receive_time_ns)
+            if self._onlookers.there:
+                assert arrival.payload is not None
+                self._onlookers.note(seat.name, arrival.payload, payload)
 
     def _seat(self, arrival: Arrival) -> Seat | None:
         """Give an avatar a row, a publisher and its skeleton on the bus; where another served it, go on from there."""
@@ -262,6 +274,7 @@ class Service:
         self._inbox.release(seat.name, seat.last_payload if lives_on else None)
         del self._seats[seat.name]
         seat.publisher.undeclare()
+        self._onlookers.forget(seat.name)
         self._free.append(seat.index)
 
     def _forget_silent(self, now_ns: int) -> None:

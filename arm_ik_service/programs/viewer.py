@@ -1,4 +1,4 @@
-"""Showing in Rerun what is on the bus, in a process of its own: a slow viewer never delays the service."""
+"""Showing in Rerun what is on the bus, in a process of its own: it watches, and never delays the service."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ class Viewer:
         self._view = LiveView(view, when_gone=self.stop)
         self.refused = 0
         self._subscribers = [
-            subscribe(bus, keys.controllers(), self._guarded(self._take_frame)),
-            subscribe(bus, keys.arms(), self._guarded(self._take_arms)),
+            subscribe(bus, keys.watched_controllers(), self._guarded(self._take_frame)),
+            subscribe(bus, keys.watched_arms(), self._guarded(self._take_arms)),
             subscribe(bus, keys.skeleton(), self._guarded(self._take_skeleton)),
         ]
         for key, payload in query(bus, keys.skeleton()):

@@ -87,7 +87,9 @@ def access_control(common_names: Iterable[str], keys: Keys | None = None) -> dic
                 ],
             )
         elif kind == "viewer":
-            everything = [keys.controllers(), keys.arms(), keys.skeleton(), keys.calibration(), keys.health()]
+            watched = [keys.watched_controllers(), keys.watched_arms()]
+            described = [keys.skeleton(), keys.calibration(), keys.health()]
+            everything = [keys.controllers(), keys.arms(), *watched, *described]
             living = [keys.liveliness()]
             built.allow(
                 name,

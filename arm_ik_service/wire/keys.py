@@ -39,6 +39,14 @@ class Keys:
         """ArmsState, out."""
         return self._under(f"avatar/{avatar}/arms")
 
+    def watched_controllers(self, avatar: str = "*") -> str:
+        """ControllerFrame, out: each that was answered, a moment later, for whoever only watches."""
+        return self._under(f"watched/{avatar}/controllers")
+
+    def watched_arms(self, avatar: str = "*") -> str:
+        """ArmsState, out: the answer once more, a moment later. Who listens here delays nobody who waits for it."""
+        return self._under(f"watched/{avatar}/arms")
+
     def skeleton(self, avatar: str = "*") -> str:
         """Skeleton: published when somebody comes and when their lengths change, and answered to queries."""
         return self._under(f"avatar/{avatar}/skeleton")

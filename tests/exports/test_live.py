@@ -62,8 +62,8 @@ def hub() -> Iterator[tuple[Bus, str]]:
 
 def publish_until(bus: Bus, states: list[ArmsState], heard: Heard, count: int) -> list[tuple[str, Any]]:
     """Publish states over and over, with the frames they answer, until so much was heard."""
-    arms = declare_stream(bus, KEYS.arms(states[0].avatar), "msgpack")
-    controllers = declare_stream(bus, KEYS.controllers(states[0].avatar), "msgpack")
+    arms = declare_stream(bus, KEYS.watched_arms(states[0].avatar), "msgpack")
+    controllers = declare_stream(bus, KEYS.watched_controllers(states[0].avatar), "msgpack")
     end = time.monotonic() + 60.0
     while heard.qsize() < count and time.monotonic() < end:
         for state in states:
@@ -171,7 +171,7 @@ def test_a_port_where_nobody_listens_and_bytes_that_are_no_state_do_not_end_it(h
         nobody = probe.getsockname()[1]
     program = Running("export", "vmc", "--to", f"127.0.0.1:{nobody}", "--connect", endpoint)
     program.wait_ready()
-    arms = declare_stream(bus, KEYS.arms("ann"), "msgpack")
+    arms = declare_stream(bus, KEYS.watched_arms("ann"), "msgpack")
     for payload in (b"\xff\x00not ours", b"", encode(person())) * 20:
         arms.put(payload)
         time.sleep(0.01)
@@ -225,7 +225,7 @@ def test_several_people_are_not_mixed_on_a_sink_that_knows_one_beside_one_that_k
         exporter = Exporter(client, [one, all_of_them], KEYS)
         worker = Thread(target=exporter.run)
         worker.start()
-        streams = {name: declare_stream(bus, KEYS.arms(name), "msgpack") for name in ("ann", "bob")}
+        streams = {name: declare_stream(bus, KEYS.watched_arms(name), "msgpack") for name in ("ann", "bob")}
         for seq in range(200):
             for name, stream in streams.items():
                 stream.put(encode(person(avatar=name, seq=seq)))

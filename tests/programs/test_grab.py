@@ -234,7 +234,9 @@ def test_on_a_bus_the_cube_is_a_key_and_the_arms_are_published() -> None:
     with open_hub(BusOptions(listen=(endpoint,))) as hub, open_client(BusOptions(connect=(endpoint,))) as client:
         answers: list[bytes] = []
         show = GrabShow(Scene(CUBE, GOAL), bus=hub)
+        watched: list[bytes] = []
         ear = subscribe(client, Keys().arms("grab"), lambda _key, payload, _time: answers.append(payload))
+        eye = subscribe(client, Keys().watched_arms("grab"), lambda _key, payload, _time: watched.append(payload))
         place = {"position": [0.7, 1.1, -2.0]}
 
         def put_and_play() -> bool:
@@ -244,10 +246,11 @@ def test_on_a_bus_the_cube_is_a_key_and_the_arms_are_published() -> None:
             return last is not None and bool(last.cube[0] == 0.7) and show.refused > 0
 
         assert wait_for(put_and_play)
-        assert wait_for(lambda: len(answers) > 0)
+        assert wait_for(lambda: len(answers) > 0 and len(watched) > 0)
         arms = codec.arms_states.decode(answers[-1])
         assert arms.avatar == "grab"
         told = [msgspec.json.decode(payload) for _, payload in query(client, CUBE_KEY)]
         assert [one["position"] for one in told] == [place["position"]]
         ear.undeclare()
+        eye.undeclare()
         show.close()

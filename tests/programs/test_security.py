@@ -89,6 +89,7 @@ def test_each_headset_writes_and_reads_its_own_and_nothing_else_and_refusals_are
         assert everything == []
         with guarded.identity("viewer-screen") as viewer:
             answers, frames = heard(viewer, KEYS.arms()), heard(viewer, KEYS.controllers())
+            watched = heard(viewer, KEYS.watched_arms())
             time.sleep(0.2)
             send(eight, "7")  # an impostor
             send(viewer, "7")  # who only looks
@@ -96,6 +97,7 @@ def test_each_headset_writes_and_reads_its_own_and_nothing_else_and_refusals_are
             assert wait_for(lambda: len(answers) == FRAMES)
             time.sleep(0.2)
             assert set(answers) == {KEYS.arms("8")}
+            assert set(watched) == {KEYS.watched_arms("8")}
             assert {key for key in frames if key != KEYS.controllers("7")} == {KEYS.controllers("8")}
             assert living(viewer, KEYS.liveliness()) == [KEYS.liveliness("main")]
         assert len(own) == FRAMES

@@ -21,6 +21,9 @@ def test_a_headset_may_put_its_own_controllers_alone_and_a_viewer_nothing() -> N
     assert granted(rules, "viewer-v", "ingress", "put") == set()
     assert granted(rules, "service-s", "ingress", "put") == {"**"}
     assert "avatar/8/arms" not in granted(rules, "headset-7", "egress", "put")
+    for direction, message in (("ingress", "declare_subscriber"), ("egress", "put")):
+        assert {"watched/*/arms", "watched/*/controllers"} <= granted(rules, "viewer-v", direction, message)
+        assert not any(key.startswith("watched/") for key in granted(rules, "headset-7", direction, message))
 
 
 def test_every_identity_is_bound_to_its_own_common_name_and_no_rule_to_another() -> None:

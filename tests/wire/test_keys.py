@@ -31,7 +31,8 @@ def test_an_endless_id_is_refused_with_its_length_and_not_repeated_whole() -> No
 @given(st.from_regex(r"\A[A-Za-z0-9_-][A-Za-z0-9_.-]{0,30}\Z"), st.sampled_from(["", "lab3", "a/b"]))
 def test_the_avatar_is_found_again_in_every_key_made_for_it(avatar: str, prefix: str) -> None:
     keys = Keys(prefix)
-    for make in (keys.controllers, keys.arms, keys.skeleton, keys.calibration):
+    watched = (keys.watched_controllers, keys.watched_arms)
+    for make in (keys.controllers, keys.arms, *watched, keys.skeleton, keys.calibration):
         key = make(avatar)
         assert keys.avatar_of(key) == avatar
         assert key.startswith(prefix)

@@ -144,6 +144,8 @@ class GrabShow:
         self._streams = (
             declare_stream(bus, keys.controllers(self._avatar), "msgpack"),
             declare_stream(bus, keys.arms(self._avatar), "msgpack"),
+            declare_stream(bus, keys.watched_controllers(self._avatar), "msgpack"),
+            declare_stream(bus, keys.watched_arms(self._avatar), "msgpack"),
         )
         skeleton = codec.encode(self._skeleton)
         key = keys.skeleton(self._avatar)
@@ -171,8 +173,9 @@ class GrabShow:
 
     def _show(self, count: int, moment: Moment) -> None:
         if self._streams is not None:
-            for stream, message in zip(self._streams, (moment.frame, moment.arms), strict=True):
-                stream.put(codec.encode(message))
+            payloads = codec.encode(moment.frame), codec.encode(moment.arms)
+            for stream, payload in zip(self._streams, 2 * payloads, strict=True):
+                stream.put(payload)
         if self._writer is not None:
             if count == 0:
                 self._writer.write_skeleton(self._avatar, codec.encode(self._skeleton), moment.arms.receive_time_ns)
