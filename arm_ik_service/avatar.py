@@ -7,6 +7,7 @@ disk: the same frames with the same receive times give the same bytes, live or r
 from __future__ import annotations
 
 import struct
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from arm_ik_service.body.profile import BodyMeasures, Profile
 from arm_ik_service.body.state import BODY
 from arm_ik_service.body.step import initialise_body, step_body
 from arm_ik_service.compiled import compiled, record_dtype
+from arm_ik_service.geometry.batch import Array
 from arm_ik_service.ik.state import ARM
 from arm_ik_service.ik.step import initialise_arm, show_ahead, step_arm
 from arm_ik_service.output.message import BODY_BYTES, LITERALS, STEPS, write_body
@@ -156,6 +158,11 @@ class Avatars:
             hand_m=profile.body.hand_m,
             shoulder_width_m=2.0 * float(body["half_width"]),
         )
+
+    def lengths(self, indices: Sequence[int]) -> Array:
+        """Return stature, upper arm, forearm and half the shoulders' width (N, 4) of the people in these rows [m]."""
+        body = self._rows["body"]
+        return np.stack([body[name][indices] for name in ("stature", "upper_arm", "forearm", "half_width")], axis=-1)
 
     def _arms(self, profile: Profile) -> tuple[ArmModel, ArmModel]:
         models = self._models.get(profile)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -115,24 +115,33 @@ def memory(healths: list[Health]) -> tuple[float, float]:
 
 
 def measure_capacity(*, rate_hz: float, seconds: float, progress: Progress | None = None) -> Capacity:
-    """Raise the number until frames are lost or late, for both kinds in turn; then load the service with twice that."""
+    """Raise the number until frames are lost or late; then load the service with twice what it carries.
+
+    Both kinds run all the time and are loaded in turns: a machine that gets busier or quieter does so for both.
+    """
     ramps: dict[str, list[Step]] = {"service": [], "empty": []}
-    overload = None
-    for kind, steps in ramps.items():
-        with serving(kind) as (bus, endpoint):
-            for avatars in range(FIRST, LAST + 1, STEP):
-                step = load(bus, endpoint, avatars, rate_hz, seconds)
-                if not step.carried:
-                    step = load(
-                        bus, endpoint, avatars, rate_hz, seconds
-                    )  # once more: the machine may have done something else
-                steps.append(step)
-                if progress is not None:
-                    progress(kind, step.measured)
-                if not step.carried:
-                    break
-            if kind == "service" and most_carried(steps):
-                overload = load(bus, endpoint, 2 * most_carried(steps), rate_hz, seconds)
-                if progress is not None:
-                    progress("twice", overload.measured)
-    return Capacity(rate_hz, ramps["service"], ramps["empty"], overload)
+    with ExitStack() as stack:
+        served = {kind: stack.enter_context(serving(kind)) for kind in ramps}
+
+        def try_it(kind: str, avatars: int, *, told_as: str | None = None, again: bool = True) -> Step:
+            step = load(*served[kind], avatars, rate_hz, seconds)
+            if again and not step.carried:  # once more: the machine may have done something else
+                step = load(*served[kind], avatars, rate_hz, seconds)
+            if progress is not None:
+                progress(told_as or kind, step.measured)
+            return step
+
+        rising = list(ramps)
+        for avatars in range(FIRST, LAST + 1, STEP):
+            for kind in tuple(rising):
+                ramps[kind].append(try_it(kind, avatars))
+                if not ramps[kind][-1].carried:
+                    rising.remove(kind)
+        for between in range(2):  # the first half of the gap, then a quarter
+            for kind, steps in ramps.items():
+                if kind not in rising and (carried := most_carried(steps)):
+                    steps.append(try_it(kind, carried + STEP // 2 ** (between + 1)))
+        carried = most_carried(ramps["service"])
+        overload = try_it("service", 2 * carried, told_as="twice", again=False) if carried else None
+    service, empty = (sorted(steps, key=lambda step: step.measured.avatars) for steps in ramps.values())
+    return Capacity(rate_hz, service, empty, overload)

@@ -6,6 +6,7 @@ Run as `python -m arm_ik_service.bench.empty_service ENDPOINT AVATARS`.
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from threading import Thread
 
 import msgspec
@@ -15,6 +16,7 @@ from arm_ik_service.avatar import Avatar, Avatars
 from arm_ik_service.bench.people import moving
 from arm_ik_service.bench.processes import wait_for_end
 from arm_ik_service.body.profile import BodyMeasures, Profile
+from arm_ik_service.geometry.batch import Array
 from arm_ik_service.io.zenoh_bus import BusOptions, open_hub
 from arm_ik_service.programs.service import BATCH, Service
 from arm_ik_service.settings import ServiceSettings, Settings
@@ -42,6 +44,12 @@ class NoAvatars(Avatars):
     def measures(self, index: int, profile: Profile) -> BodyMeasures:
         """Nobody learns."""
         return profile.body
+
+    def lengths(self, indices: Sequence[int]) -> Array:
+        """Nobody grows."""
+        body = Profile().body
+        lengths = (body.stature_m, body.upper_arm, body.forearm, 0.5 * body.shoulder_width)
+        return np.tile(lengths, (len(indices), 1))
 
     def add(self, index: int, frame: ControllerFrame, receive_time_ns: int, predict_to_ns: int | None = None) -> int:
         """Take a place in the batch."""

@@ -103,7 +103,7 @@ def capacity(
     """Raise the number of people until frames are lost or late; the same without the solve; then twice that many.
 
     Carried are those of whom 99 % of the frames are answered, 99 % of these within 13.9 ms in the service and 20 ms at
-    the client. The load comes from processes that share the machine.
+    the client. Both kinds of service are loaded in turns, by processes that share the machine.
 
     Example: [bold]arm-ik bench capacity --seconds 20[/bold]
     """

@@ -19,6 +19,7 @@ import zenoh
 
 from arm_ik_service.errors import WireError
 from arm_ik_service.io.jitter_buffer import JitterBuffer, Pace
+from arm_ik_service.io.zenoh_threads import keep_thread_state
 from arm_ik_service.wire.keys import Keys, check_id
 
 _WAKE = ""  # no avatar's id
@@ -192,6 +193,7 @@ class Inbox:
         return self._owns(avatar)
 
     def _receive(self, sample: zenoh.Sample) -> None:
+        keep_thread_state()
         receive_time_ns = time.time_ns()
         key = str(sample.key_expr)
         door = self._doors.get(key) or self._admit(key)

@@ -8,6 +8,7 @@ from typing import Any
 
 import zenoh
 
+from arm_ik_service.io.zenoh_threads import keep_thread_state
 from arm_ik_service.wire.codec import MEDIA_TYPES
 from arm_ik_service.wire.messages import Encoding
 
@@ -65,6 +66,7 @@ def subscribe(bus: Bus, key: str, receive: Callable[[str, bytes, int], None]) ->
     """Call `receive(key, payload, receive_time_ns)` for every sample, on Zenoh's network thread: store and return."""
 
     def received(sample: zenoh.Sample) -> None:
+        keep_thread_state()
         receive(str(sample.key_expr), sample.payload.to_bytes(), time.time_ns())
 
     return bus.declare_subscriber(key, zenoh.handlers.Callback(received, indirect=False))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -9,6 +10,7 @@ import msgspec
 import numpy as np
 
 from arm_ik_service.body.profile import BodyMeasures, Profile
+from arm_ik_service.geometry.batch import Array
 from arm_ik_service.io.zenoh_streams import Stream
 from arm_ik_service.wire.codec import MapDecoder
 from arm_ik_service.wire.messages import TRACKING_STATES, AvatarHealth, TrackingState
@@ -70,25 +72,23 @@ class Seat:
             tracking=min((hand.tracking for hand in hands), key=TRACKING_STATES.index, default="lost"),
         )
 
-    def has_outgrown(self, measures: BodyMeasures) -> bool:
-        """Whether these are noticeably other lengths than its skeleton tells."""
-        told = self.measures
-        return any(
-            abs(now - before) > NOTICEABLE * before
-            for now, before in (
-                (measures.stature_m, told.stature_m),
-                (measures.upper_arm, told.upper_arm),
-                (measures.forearm, told.forearm),
-                (measures.shoulder_width, told.shoulder_width),
-            )
-        )
-
     def _hands(self) -> tuple[_Hand, ...]:
         """Both hands as the last answer told them."""
         if self.last_payload is None:
             return ()
         hands = _both_hands.decode(self.last_payload)
         return hands.left, hands.right
+
+
+def outgrown(seats: Sequence[Seat], lengths: Array) -> list[Seat]:
+    """Return those whose `Avatars.lengths` (N, 4) are noticeably others than their skeletons tell."""
+    told = np.array([_lengths(seat.measures) for seat in seats])
+    noticeable = (np.abs(lengths - told) > NOTICEABLE * told).any(axis=1)
+    return [seat for seat, new in zip(seats, noticeable, strict=True) if new]
+
+
+def _lengths(measures: BodyMeasures) -> tuple[float, ...]:
+    return measures.stature_m, measures.upper_arm, measures.forearm, 0.5 * measures.shoulder_width
 
 
 @dataclass(slots=True)

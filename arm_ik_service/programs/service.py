@@ -23,7 +23,7 @@ from arm_ik_service.programs.fleet import Fleet
 from arm_ik_service.programs.look_out import LookOut, profiles
 from arm_ik_service.programs.onlookers import LINGER_S, Onlookers
 from arm_ik_service.programs.rehearsal import Rehearsal
-from arm_ik_service.programs.seats import Seat
+from arm_ik_service.programs.seats import Seat, outgrown
 from arm_ik_service.programs.tally import Tally
 from arm_ik_service.settings import Settings
 from arm_ik_service.skeleton import skeleton_of
@@ -39,6 +39,8 @@ BATCH = 8  # frames solved by one call: more saves little per frame and delays t
 # where the newest of each avatar wins.
 BACK_TO_BACK_NS = 50_000  # between the end of one and the next: it had been waiting
 MOST_BACK_TO_BACK = 3
+TOLD_AT_ONCE = 8  # people of a health: all of them would keep frames waiting for longer than a frame lasts
+DONE = object()
 SPEAKING_S = 0.5  # after its last frame somebody is expected to send another
 
 
@@ -66,6 +68,7 @@ class Service:
         self._seats: dict[str, Seat] = {}
         self._tally = Tally()
         self._health_at_s = time.monotonic()
+        self._telling: Iterator[None] | None = None  # a health that is being put together
         self._services_changed = False
         self._working = Lock()  # held by whoever touches avatars and seats
         self._ended_ns = 0  # when the last frame was answered
@@ -138,8 +141,10 @@ class Service:
                     now_s = time.monotonic()
                     if now_s >= self._look_out.due_s:
                         self._look_out.turn(now_s)
-                    if now_s >= self._health_at_s:
-                        self._publish_health()
+                    if self._telling is None and now_s >= self._health_at_s:
+                        self._telling = self._tell_health()
+                    if self._telling is not None and next(self._telling, DONE) is DONE:
+                        self._telling = None
                         gc.collect(1)
         finally:
             gc.enable()
@@ -147,7 +152,7 @@ class Service:
 
     def _idle_for_s(self) -> float:
         """For how long there is nothing to do but to wait for frames; rehearses first if that is due."""
-        if self._services_changed:
+        if self._services_changed or self._telling is not None:
             return 0.0
         due_s = min(self._health_at_s, self._look_out.due_s) - time.monotonic()
         quiet_s = (time.perf_counter_ns() - self._ended_ns) / 1e9
@@ -169,7 +174,8 @@ class Service:
         self._fleet.leave()
         with self._working:
             self._onlookers.close()
-            self._publish_health()
+            for _ in self._tell_health():
+                pass
 
     # --- frames
 
@@ -339,32 +345,36 @@ class Service:
 
     # --- what is told
 
-    def _publish_health(self) -> None:
-        """Publish and log what the last period brought; called between frames."""
+    def _tell_health(self) -> Iterator[None]:
+        """Publish and log what the last period brought, a few people at a time, and frames between them."""
+        # an absolute schedule, but never a burst of healths after a stall
+        self._health_at_s = max(self._health_at_s + self._limits.health_period_s, time.monotonic())
         for cause, (count, detail) in self._inbox.take_refused().items():
             self._tally.refused(cause, detail, count=count)
         self._tally.log_refused()
         now_ns = time.time_ns()
         self._forget_silent(now_ns)
-        period_s = self._limits.health_period_s
-        avatars = (seat.health(now_ns, period_s, self._inbox.refused_of(seat.name)) for seat in self._seats.values())
+        seats, avatars = list(self._seats.values()), []
+        for some in _portions(seats):
+            for seat in some:
+                refused_at_door = self._inbox.refused_of(seat.name)
+                avatars.append(seat.health(now_ns, self._limits.health_period_s, refused_at_door))
+            yield
         health = self._tally.health(self._name, now_ns, avatars, self._fleet.services)
         self._health.put(codec.encode(health, self._limits.encoding))
-        self._tell_what_was_learnt()
-        # an absolute schedule, but never a burst of healths after a stall
-        self._health_at_s = max(self._health_at_s + period_s, time.monotonic())
+        yield
+        for some in _portions(seats):
+            for seat in outgrown(some, self._avatars.lengths([seat.index for seat in some])):
+                if self._seats.get(seat.name) is seat:  # may have left in between
+                    self._tell_what_was_learnt(seat)
+                    yield
+            yield
 
-    def _tell_what_was_learnt(self) -> None:
-        """Publish the skeletons again of those whose lengths have turned out noticeably other than they tell.
-
-        Between frames, and without waiting for room: whoever misses it asks, or hears the next one.
-        """
-        for seat in self._seats.values():
-            measures = self._avatars.measures(seat.index, seat.profile)
-            if seat.has_outgrown(measures):
-                seat.measures = measures
-                key = self._keys.skeleton(seat.name)
-                put_once(self._session, key, self._skeleton(seat), self._limits.encoding, waits=False)
+    def _tell_what_was_learnt(self, seat: Seat) -> None:
+        """Publish somebody's skeleton again, without waiting for room: whoever misses it asks, or hears the next."""
+        seat.measures = self._avatars.measures(seat.index, seat.profile)
+        key = self._keys.skeleton(seat.name)
+        put_once(self._session, key, self._skeleton(seat), self._limits.encoding, waits=False)
 
     def _of_everybody(
         self, key_of: Callable[[str], str], make: Callable[[Seat], bytes | None]
@@ -382,3 +392,8 @@ class Service:
     def farewell(self) -> str:
         """Return one line that says what was served."""
         return self._tally.farewell()
+
+
+def _portions(seats: list[Seat]) -> Iterator[list[Seat]]:
+    for first in range(0, len(seats), TOLD_AT_ONCE):
+        yield seats[first : first + TOLD_AT_ONCE]
