@@ -38,7 +38,7 @@ def compiled(function: Function) -> Function:
 def inner(function: Function, *, inline: bool = False) -> Function:
     """Compile `function` only as part of others: from Python it runs as Python.
 
-    The entry from Python that numba compiles for every other function is a quarter of the time of a first start.
+    The entry from Python that numba compiles for every other function is a sixth of the time of a first start.
     """
     if cast(Any, numba.config).DISABLE_JIT:
         return function

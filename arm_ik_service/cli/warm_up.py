@@ -14,7 +14,7 @@ SAY_AFTER_S = 1.2  # loading compiled code from the cache takes less
 
 def warm_up(settings: Settings, say: Callable[[str], None]) -> None:
     """Run the whole pipeline once on a made-up frame, so that every function is compiled or loaded."""
-    note = Timer(SAY_AFTER_S, say, ["compiling the solver: once after an installation, some 10 to 20 s ..."])
+    note = Timer(SAY_AFTER_S, say, ["compiling the solver: once after an installation, some 15 to 30 s ..."])
     note.daemon = True
     note.start()
     try:
