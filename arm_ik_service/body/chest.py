@@ -19,12 +19,14 @@ PITCH_SHARE = 0.2  # of the head's pitch that the chest takes part in (fit)
 ROLL_SHARE = 0.45  # the same for roll (fit)
 
 # The chest faces along a sum of horizontal directions: the head's, of length 1, and those below. They cannot outweigh
-# it, so the chest never turns its back to the face, wherever the hands are.
-HAND_PULL = 0.35  # from the neck to each hand, in arm lengths, at most 1 (fit)
-HANDS_LINE_PULL = 0.25  # perpendicular to the line between the hands, in arm lengths, at most 1 (fit)
-FACING_TIME_S = 0.05  # time in which the chest follows (fit)
+# it, so the chest never turns its back to the face, wherever the hands are. The elbows tell more than the hands: they
+# hang on the shoulders, and a wrist is rarely bent far, so the hand's own direction shows where its elbow is to 5 cm.
+ELBOW_IN_WRIST: Vector = (0.0, 0.1, 0.42)  # of a hand as it is usually held, in arm lengths (fit)
+HAND_PULL = 0.15  # from the neck to each hand, in arm lengths, at most 1 (fit)
+ELBOWS_LINE_PULL = 0.65  # perpendicular to the line between the elbows, in arm lengths, at most 1 (fit)
+FACING_TIME_S = 0.02  # by which the chest trails a steady turn (fit)
 SURE_FACING = 0.5  # a shorter sum says little about the direction: the chest follows less
-FASTEST_TURN_RAD_S = 12.0  # of a chest; a skater's pirouette is 30, a dancer's 15
+FASTEST_TURN_RAD_S = 25.0  # of a chest; a skater's pirouette is 30, a dancer's 15
 LARGEST_TURN_RAD = 0.33  # in a frame, whatever its length ...
 RECENTRED_RAD = 0.5  # ... unless the space turned by more than this: less may be the pop of a whole recording
 
@@ -36,16 +38,34 @@ def _pull(weight: float, x: float, z: float, arm_length: float) -> Vector:
     return (s * x, 0.0, s * z)
 
 
+@inner
+def _elbow_from_hand(body: Record, k: int) -> Vector:
+    """Where the elbow is by the hand alone, in world axes."""
+    wrist = body.wrists[k]
+    away = g.scale(body.arm_length, ELBOW_IN_WRIST)
+    return g.add(g.vector(wrist.position), g.rotate(g.quaternion(wrist.rotation), away))
+
+
 @compiled
 def facing(body: Record, neck: Vector, head: Quaternion) -> Vector:
     """Horizontal direction the chest would face if it had the time; shorter where that is less sure."""
-    left, right = g.vector(body.wrists[0].position), g.vector(body.wrists[1].position)
-    line = g.subtract(right, left)
-    total = g.add(g.heading(head), _pull(HANDS_LINE_PULL, line[2], -line[0], body.arm_length))
-    for hand in (left, right):
-        away = g.subtract(hand, neck)
+    line = g.subtract(_elbow_from_hand(body, 1), _elbow_from_hand(body, 0))
+    total = g.add(g.heading(head), _pull(ELBOWS_LINE_PULL, line[2], -line[0], body.arm_length))
+    for k in range(2):
+        away = g.subtract(g.vector(body.wrists[k].position), neck)
         total = g.add(total, _pull(HAND_PULL, away[0], away[2], body.arm_length))
     return total
+
+
+@inner
+def followed_rate(rate: float, away: float, trails_s: float, elapsed_s: float) -> float:
+    """Rate of a critically damped follower that is `away` from its goal and trails a steady motion by `trails_s`.
+
+    Implicit in time: it neither overshoots more nor blows up where frames are long. What it follows with is continuous,
+    so a goal that leaps or trembles reaches the arms as a swing.
+    """
+    stiff = 2.0 * elapsed_s / trails_s
+    return (rate + stiff * stiff / elapsed_s * away) / (1.0 + 2.0 * stiff + stiff * stiff)
 
 
 @inner
@@ -55,9 +75,10 @@ def _turn(body: Record, direction: Vector, recentred: float, elapsed_s: float) -
         body.yaw = yaw
         return
     sure = min(g.norm(direction) / SURE_FACING, 1.0)
-    most = FASTEST_TURN_RAD_S * elapsed_s
-    turn = sure * g.wrap(yaw - body.yaw - recentred) * (1.0 - math.exp(-elapsed_s / FACING_TIME_S))
-    turn = recentred + g.clip(turn, -most, most)
+    away = sure * g.wrap(yaw - body.yaw - recentred)
+    body.yaw_rate = followed_rate(body.yaw_rate, away, FACING_TIME_S, elapsed_s)
+    body.yaw_rate = g.clip(body.yaw_rate, -FASTEST_TURN_RAD_S, FASTEST_TURN_RAD_S)
+    turn = recentred + body.yaw_rate * elapsed_s
     if abs(recentred) < RECENTRED_RAD:
         turn = g.clip(turn, -LARGEST_TURN_RAD, LARGEST_TURN_RAD)
     body.yaw = g.wrap(body.yaw + turn)

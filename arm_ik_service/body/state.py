@@ -41,6 +41,7 @@ BODY = record_dtype(
         # memory
         ("started", np.int64),
         ("yaw", np.float64),  # of the chest, about +Y
+        ("yaw_rate", np.float64),  # [rad/s] with which it follows
         ("learning", LEARNING),
         ("settled", np.float64),  # how far the shoulders have been found to sit below where they were thought to be
     ]

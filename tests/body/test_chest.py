@@ -7,6 +7,7 @@ import numpy.typing as npt
 import pytest
 from persons import HEAD, LEFT, RIGHT, Take, run, standing, stroke
 
+from arm_ik_service.body.profile import Profile
 from arm_ik_service.geometry import batch
 
 Array = npt.NDArray[np.float64]
@@ -68,7 +69,26 @@ def test_both_hands_crossed_behind_the_back_do_not_turn_the_chest_round() -> Non
     assert np.abs(yaw_degrees(take)).max() < 60.0
 
 
-@pytest.mark.parametrize("rate", [30.0, 90.0])
+@pytest.mark.parametrize("turn_rad_s", [6.0, 15.0])
+def test_a_spin_is_followed_all_the_way_round(turn_rad_s: float) -> None:
+    take = standing(2.0)
+    turned = np.degrees(turn_rad_s * np.maximum(take.t - 0.3, 0.0))
+    spin = np.concatenate([np.zeros((len(take.t), 3)), about_y(turned)], axis=1)
+    behind = turned - yaw_degrees(take.in_space(spin[:, None]))
+    assert np.abs(behind).max() < 45.0
+    assert 0.0 < behind[-1] < 25.0
+
+
+def test_a_forearm_across_the_body_brings_that_shoulder_ahead() -> None:
+    grips = Profile().grip
+    pointing = {LEFT: (-90.0, grips.left), RIGHT: (0.0, grips.right)}  # the left hand's fingers to the right
+    take = standing(1.0)
+    for device, (degrees, grip) in pointing.items():
+        take = take.turned(device, batch.multiply(about_y(degrees), grip.orientation_xyzw))
+    assert -25.0 < yaw_degrees(take)[-1] < -5.0
+
+
+@pytest.mark.parametrize("rate", [30.0, 72.0, 90.0, 120.0])
 def test_the_chest_never_turns_more_than_20_degrees_in_a_frame(rate: float) -> None:
     rng = np.random.default_rng(2)
     take = standing(4.0, rate)
