@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 
+from arm_ik_service.body.follow import follow, followed_rate, predicted_follow, settled_time, start_at
 from arm_ik_service.body.state import ARM_LENGTH_OF_FIT
 from arm_ik_service.compiled import Record, compiled, inner
 from arm_ik_service.geometry import scalar as g
@@ -24,9 +25,12 @@ ROLL_SHARE = 0.45  # the same for roll (fit)
 ELBOW_IN_WRIST: Vector = (0.0, 0.1, 0.42)  # of a hand as it is usually held, in arm lengths (fit)
 HAND_PULL = 0.15  # from the neck to each hand, in arm lengths, at most 1 (fit)
 ELBOWS_LINE_PULL = 0.65  # perpendicular to the line between the elbows, in arm lengths, at most 1 (fit)
+FOREARMS_TIME_S = 0.03  # by which the elbows trail behind the hands' turning, on the chest
 FACING_TIME_S = 0.02  # by which the chest trails a steady turn (fit)
 SURE_FACING = 0.5  # a shorter sum says little about the direction: the chest follows less
 FASTEST_TURN_RAD_S = 25.0  # of a chest; a skater's pirouette is 30, a dancer's 15
+NECK_TIME_S = 0.02  # of the neck's fading memory
+TILT_TIME_S = 0.05  # by which pitch and roll of the chest trail the head's
 LARGEST_TURN_RAD = 0.33  # in a frame, whatever its length ...
 RECENTRED_RAD = 0.5  # ... unless the space turned by more than this: less may be the pop of a whole recording
 
@@ -39,33 +43,28 @@ def _pull(weight: float, x: float, z: float, arm_length: float) -> Vector:
 
 
 @inner
-def _elbow_from_hand(body: Record, k: int) -> Vector:
-    """Where the elbow is by the hand alone, in world axes."""
-    wrist = body.wrists[k]
-    away = g.scale(body.arm_length, ELBOW_IN_WRIST)
-    return g.add(g.vector(wrist.position), g.rotate(g.quaternion(wrist.rotation), away))
+def _step_forearms(body: Record, yaw: float, elapsed_s: float) -> None:
+    """Update where each elbow is by the hand alone. A wrist that flicks turns no chest, one that stays bent does."""
+    upright = g.rotation_y(-yaw)
+    for k in range(2):
+        to_elbow = g.scale(body.arm_length, ELBOW_IN_WRIST)
+        to_elbow = g.rotate(g.multiply(upright, g.quaternion(body.wrists[k].rotation)), to_elbow)
+        if body.started == 0:
+            start_at(body.forearms[k], to_elbow)
+        follow(body.forearms[k], to_elbow, FOREARMS_TIME_S, body.since_s, elapsed_s)
 
 
 @compiled
-def facing(body: Record, neck: Vector, head: Quaternion) -> Vector:
-    """Horizontal direction the chest would face if it had the time; shorter where that is less sure."""
-    line = g.subtract(_elbow_from_hand(body, 1), _elbow_from_hand(body, 0))
+def facing(body: Record, neck: Vector, head: Quaternion, yaw: float) -> Vector:
+    """Horizontal direction the chest, now at `yaw`, would face if it had the time; shorter where that is less sure."""
+    hands = g.subtract(g.vector(body.wrists[1].position), g.vector(body.wrists[0].position))
+    forearms = g.subtract(g.vector(body.forearms[1].at), g.vector(body.forearms[0].at))
+    line = g.add(hands, g.rotate(g.rotation_y(yaw), forearms))
     total = g.add(g.heading(head), _pull(ELBOWS_LINE_PULL, line[2], -line[0], body.arm_length))
     for k in range(2):
         away = g.subtract(g.vector(body.wrists[k].position), neck)
         total = g.add(total, _pull(HAND_PULL, away[0], away[2], body.arm_length))
     return total
-
-
-@inner
-def followed_rate(rate: float, away: float, trails_s: float, elapsed_s: float) -> float:
-    """Rate of a critically damped follower that is `away` from its goal and trails a steady motion by `trails_s`.
-
-    Implicit in time: it neither overshoots more nor blows up where frames are long. What it follows with is continuous,
-    so a goal that leaps or trembles reaches the arms as a swing.
-    """
-    stiff = 2.0 * elapsed_s / trails_s
-    return (rate + stiff * stiff / elapsed_s * away) / (1.0 + 2.0 * stiff + stiff * stiff)
 
 
 @inner
@@ -76,7 +75,7 @@ def _turn(body: Record, direction: Vector, recentred: float, elapsed_s: float) -
         return
     sure = min(g.norm(direction) / SURE_FACING, 1.0)
     away = sure * g.wrap(yaw - body.yaw - recentred)
-    body.yaw_rate = followed_rate(body.yaw_rate, away, FACING_TIME_S, elapsed_s)
+    body.yaw_rate = followed_rate(body.yaw_rate, away, settled_time(FACING_TIME_S, body.since_s), elapsed_s)
     body.yaw_rate = g.clip(body.yaw_rate, -FASTEST_TURN_RAD_S, FASTEST_TURN_RAD_S)
     turn = recentred + body.yaw_rate * elapsed_s
     if abs(recentred) < RECENTRED_RAD:
@@ -84,17 +83,47 @@ def _turn(body: Record, direction: Vector, recentred: float, elapsed_s: float) -
     body.yaw = g.wrap(body.yaw + turn)
 
 
+@inner
+def _steady_neck(body: Record, asked: Vector, tracking: Record, elapsed_s: float) -> Vector:
+    """Return the neck without its trembling."""
+    if body.started == 0:
+        start_at(body.neck, asked)
+    elif body.recentres != tracking.recentres:  # the space was moved under it
+        turn = g.rotation_y(tracking.recentred_yaw)
+        away = g.rotate(turn, g.subtract(g.vector(body.neck.at), g.vector(tracking.recentred_from)))
+        g.store(body.neck.at, g.add(g.vector(tracking.recentred_to), away))
+        g.store(body.neck.rate, g.rotate(turn, g.vector(body.neck.rate)))
+    if body.started != 0:
+        predicted_follow(body.neck, asked, NECK_TIME_S, body.since_s, elapsed_s)
+    body.recentres = tracking.recentres
+    return g.vector(body.neck.at)
+
+
+@inner
+def _tilted(body: Record, head: Quaternion, elapsed_s: float) -> Quaternion:
+    """Return the rotation of the chest: its yaw, and the part of the head's pitch and roll that it takes."""
+    upright = g.rotation_y(body.yaw)
+    head_up = g.rotate(g.conjugate(upright), g.rotate(head, g.Y))
+    asked = (ROLL_SHARE * head_up[0], 0.0, PITCH_SHARE * head_up[2])
+    if body.started == 0:
+        start_at(body.tilt, asked)
+    up = g.add(g.Y, follow(body.tilt, asked, TILT_TIME_S, body.since_s, elapsed_s))
+    return g.normalized(g.multiply(upright, g.between(g.Y, g.scale(1.0 / g.norm(up), up))))
+
+
 @compiled
-def step_chest(body: Record, recentred: float, elapsed_s: float) -> None:
-    """Update the pose of the chest from head and wrists, in a space that turned by `recentred` [rad]."""
+def step_chest(body: Record, tracking: Record, elapsed_s: float) -> None:
+    """Update the pose of the chest from head and wrists."""
     head = g.quaternion(body.head_rotation)
     pivot = g.scale(body.arm_length / ARM_LENGTH_OF_FIT, NECK_PIVOT_IN_HEAD)
     neck = g.add(g.vector(body.head_position), g.rotate(head, pivot))
-    _turn(body, facing(body, neck, head), recentred, elapsed_s)
-    upright = g.rotation_y(body.yaw)
-    head_up = g.rotate(g.conjugate(upright), g.rotate(head, g.Y))
-    up = (ROLL_SHARE * head_up[0], 1.0, PITCH_SHARE * head_up[2])
-    chest = g.normalized(g.multiply(upright, g.between(g.Y, g.scale(1.0 / g.norm(up), up))))
+    yaw = g.wrap(body.yaw + tracking.recentred_yaw)
+    _step_forearms(body, yaw, elapsed_s)
+    _turn(body, facing(body, neck, head, yaw), tracking.recentred_yaw, elapsed_s)
+    if body.started == 0:  # in the axes that were not known before
+        _step_forearms(body, body.yaw, elapsed_s)
+    neck = _steady_neck(body, neck, tracking, elapsed_s)
+    chest = _tilted(body, head, elapsed_s)
     drop = SHOULDER_DROP * body.half_width + body.settled
     g.store(body.chest_rotation, chest)
     g.store(body.chest_position, g.add(neck, g.rotate(chest, (0.0, -drop, 0.0))))

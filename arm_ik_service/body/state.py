@@ -10,6 +10,7 @@ from arm_ik_service.compiled import record_dtype
 ARM_LENGTH_OF_FIT = 0.56  # [m] of the people that the body's constants are from: lengths scale with the arm's
 
 POSE = record_dtype([("position", np.float64, (3,)), ("rotation", np.float64, (4,))])
+FOLLOWER = record_dtype([("at", np.float64, (3,)), ("rate", np.float64, (3,))])
 TARGET = record_dtype(
     [
         # of the wrist frame in the shoulder frame of its side, after the soft reach clamp
@@ -40,8 +41,13 @@ BODY = record_dtype(
         ("reach_ratio", np.float64, (2,)),  # shoulder to wrist asked for, over arm_length
         # memory
         ("started", np.int64),
+        ("since_s", np.float64),  # since the first frame
         ("yaw", np.float64),  # of the chest, about +Y
         ("yaw_rate", np.float64),  # [rad/s] with which it follows
+        ("neck", FOLLOWER),  # what the head turns on, in world axes
+        ("forearms", FOLLOWER, (2,)),  # from each wrist to its elbow as the hand shows it, in axes that share the yaw
+        ("tilt", FOLLOWER),  # the chest's up over its y, in axes that share its yaw
+        ("recentres", np.int64),  # of tracking, that the memory in world axes was moved along with
         ("learning", LEARNING),
         ("settled", np.float64),  # how far the shoulders have been found to sit below where they were thought to be
     ]

@@ -80,7 +80,7 @@ def step_body(body: Record, tracking: Record, settings: Record) -> None:
     elapsed_s = min(tracking.interval_s, LONGEST_STEP_S)
     for k in range(2):
         _place_wrist(body, tracking, k)
-    step_chest(body, tracking.recentred_yaw, elapsed_s)
+    step_chest(body, tracking, elapsed_s)
     learns = settings.learns and body.learning.arms
     if learns:
         learn(body, tracking, elapsed_s)
@@ -91,4 +91,5 @@ def step_body(body: Record, tracking: Record, settings: Record) -> None:
             settle(body, k, elapsed_s)
         step_shoulder(body, k)
         _set_target(body, k, dt_s, settings)
+    body.since_s += elapsed_s if body.started else 0.0
     body.started = 1

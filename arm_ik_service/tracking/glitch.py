@@ -13,7 +13,7 @@ from arm_ik_service.compiled import Record, compiled, inner
 from arm_ik_service.geometry import scalar as g
 from arm_ik_service.geometry.scalar import Quaternion, Vector
 
-FASTEST_M_S = 16.0
+FASTEST_M_S = 14.0
 FASTEST_M_S2 = 1500.0
 FASTEST_RAD_S = 140.0
 LARGEST_TURN_RAD = 2.5  # nearer to half a turn the direction of a step is not known, whatever the time

@@ -76,3 +76,5 @@ def follow_recentre(tracking: Record, frame: Record, elapsed_s: float) -> None:
             _move_device(tracking.hands[k], old, new, turn)
         tracking.recentres += 1
         tracking.recentred_yaw = yaw
+        g.store(tracking.recentred_from, old)
+        g.store(tracking.recentred_to, new)

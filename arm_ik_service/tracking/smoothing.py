@@ -39,10 +39,12 @@ def _adaptive_gain(channel: Record, filters: Any, level: int, away: float, dt_s:
     follow = max(_gain(SLOPE_HZ, dt_s), dt_s / channel.restarted_s)  # at first the mean of what there is
     slope = g.lerp(g.vector(channel.slope), g.vector(channel.rate), follow)
     g.store(channel.slope, slope)
-    if level == OFF or channel.restarted_s < STARTS_FOR_S:
+    if level == OFF:
         return 1.0
     gain = _gain(rest_hz + rise * max(g.norm(slope) - threshold, 0.0), dt_s)
-    return float(max(gain, 1.0 - leash / max(away, leash)))
+    gain = max(gain, min(2.0 - channel.restarted_s / STARTS_FOR_S, 1.0))
+    left = (1.0 - gain) * away / leash
+    return float(1.0 - (1.0 - gain) / (1.0 + left**8) ** 0.125)
 
 
 @compiled

@@ -75,7 +75,9 @@ TRACKING = record_dtype(
         ("has_heading", np.int64),
         ("heading", np.float64),  # of the person, not of a glance; about +Y
         ("recentres", np.int64),  # how often the tracked space was found to have been moved
-        ("recentred_yaw", np.float64),  # by how much in this frame, about +Y
+        ("recentred_yaw", np.float64),  # by how much in this frame, about +Y ...
+        ("recentred_from", np.float64, (3,)),  # ... around this point, which then went ...
+        ("recentred_to", np.float64, (3,)),  # ... here
     ]
 )
 
