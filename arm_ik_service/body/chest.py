@@ -1,7 +1,8 @@
 """Where the chest is and which way it faces, from head and hands over time.
 
 Constants marked (fit) minimise the distance to the recorded shoulders on the CMU and Xia recordings, half a centimetre
-around the optimum being flat; other families of recordings were kept out and are met as well.
+around the optimum being flat; those marked (chosen) were chosen by looking at all the recordings there are, the other
+families' too, so these no longer tell how well they do on other people.
 """
 
 from __future__ import annotations
@@ -22,14 +23,14 @@ ROLL_SHARE = 0.45  # the same for roll (fit)
 # The chest faces along a sum of horizontal directions: the head's, of length 1, and those below. They cannot outweigh
 # it, so the chest never turns its back to the face, wherever the hands are. The elbows tell more than the hands: they
 # hang on the shoulders, and a wrist is rarely bent far, so the hand's own direction shows where its elbow is to 5 cm.
-ELBOW_IN_WRIST: Vector = (0.0, 0.1, 0.42)  # of a hand as it is usually held, in arm lengths (fit)
-HAND_PULL = 0.15  # from the neck to each hand, in arm lengths, at most 1 (fit)
-ELBOWS_LINE_PULL = 0.65  # perpendicular to the line between the elbows, in arm lengths, at most 1 (fit)
-FOREARMS_TIME_S = 0.03  # by which the elbows trail behind the hands' turning, on the chest
-FACING_TIME_S = 0.02  # by which the chest trails a steady turn (fit)
+ELBOW_IN_WRIST: Vector = (0.0, 0.1, 0.42)  # of a hand as it is usually held, in arm lengths (chosen)
+HAND_PULL = 0.15  # from the neck to each hand, in arm lengths, at most 1 (chosen)
+ELBOWS_LINE_PULL = 0.65  # perpendicular to the line between the elbows, in arm lengths, at most 1 (chosen)
+FOREARMS_TIME_S = 0.03  # by which the elbows trail behind the hands' turning, on the chest (chosen)
+FACING_TIME_S = 0.02  # by which the chest trails a steady turn (chosen)
 SURE_FACING = 0.5  # a shorter sum says little about the direction: the chest follows less
 FASTEST_TURN_RAD_S = 25.0  # of a chest; a skater's pirouette is 30, a dancer's 15
-NECK_TIME_S = 0.02  # of the neck's fading memory
+NECK_TIME_S = 0.02  # of the neck's fading memory (chosen)
 TILT_TIME_S = 0.05  # by which pitch and roll of the chest trail the head's
 LARGEST_TURN_RAD = 0.33  # in a frame, whatever its length ...
 RECENTRED_RAD = 0.5  # ... unless the space turned by more than this: less may be the pop of a whole recording
