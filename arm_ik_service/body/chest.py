@@ -1,8 +1,8 @@
 """Where the chest is and which way it faces, from head and hands over time.
 
-Constants marked (fit) minimise the distance to the recorded shoulders on the CMU and Xia recordings, half a centimetre
-around the optimum being flat; those marked (chosen) were chosen by looking at all the recordings there are, the other
-families' too, so these no longer tell how well they do on other people.
+Constants marked (fit) minimise, on the CMU and Xia recordings alone and with equal weight for each of their four
+people, the distance to the recorded shoulders [cm] and half of what the shoulders' jerk exceeds the recorded one by.
+The optimum is flat: of its neighbours within 0.1 cm those are taken that do as well on a person left out of the fit.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ ROLL_SHARE = 0.45  # the same for roll (fit)
 # The chest faces along a sum of horizontal directions: the head's, of length 1, and those below. They cannot outweigh
 # it, so the chest never turns its back to the face, wherever the hands are. The elbows tell more than the hands: they
 # hang on the shoulders, and a wrist is rarely bent far, so the hand's own direction shows where its elbow is to 5 cm.
-ELBOW_IN_WRIST: Vector = (0.0, 0.1, 0.42)  # of a hand as it is usually held, in arm lengths (chosen)
-HAND_PULL = 0.15  # from the neck to each hand, in arm lengths, at most 1 (chosen)
-ELBOWS_LINE_PULL = 0.65  # perpendicular to the line between the elbows, in arm lengths, at most 1 (chosen)
-FOREARMS_TIME_S = 0.03  # by which the elbows trail behind the hands' turning, on the chest (chosen)
-FACING_TIME_S = 0.02  # by which the chest trails a steady turn (chosen)
+ELBOW_IN_WRIST: Vector = (0.0, 0.2, 0.44)  # in arm lengths: a forearm along, for a hand as it is held beside (fit)
+HAND_PULL = 0.1  # from the neck to each hand, in arm lengths, at most 1 (fit)
+ELBOWS_LINE_PULL = 0.75  # perpendicular to the line between the elbows, in arm lengths, at most 1 (fit)
+FOREARMS_TIME_S = 0.03  # by which the elbows trail behind the hands' turning, on the chest (fit)
+FACING_TIME_S = 0.02  # by which the chest trails a steady turn (fit)
 SURE_FACING = 0.5  # a shorter sum says little about the direction: the chest follows less
 FASTEST_TURN_RAD_S = 25.0  # of a chest; a skater's pirouette is 30, a dancer's 15
-NECK_TIME_S = 0.02  # of the neck's fading memory (chosen)
-TILT_TIME_S = 0.05  # by which pitch and roll of the chest trail the head's
+NECK_TIME_S = 0.025  # of the neck's fading memory (fit)
+TILT_TIME_S = 0.05  # by which pitch and roll of the chest trail the head's (fit)
 LARGEST_TURN_RAD = 0.33  # in a frame, whatever its length ...
 RECENTRED_RAD = 0.5  # ... unless the space turned by more than this: less may be the pop of a whole recording
 

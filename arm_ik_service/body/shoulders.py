@@ -13,9 +13,11 @@ from arm_ik_service.geometry.scalar import Vector
 
 ELEVATION_M = 0.02  # rise of the shoulder from a hanging arm to one straight up (fit)
 PROTRACTION_M = 0.015  # advance of the shoulder for an arm straight ahead (fit)
-GIVES_FROM = 0.82  # reach ratio beyond which the girdle takes part of the reach ...
-GIVES = 0.5  # ... in the end this part of what is added (fit)
-GIVES_FULLY_AFTER = 0.25  # ... over this range of the ratio, which no hand passes in a frame: it sets in without a jerk
+# In a fit to the shoulders alone the place where this sets in is flat from 0.8 to 0.87; the lower, the better hands are
+# met. Over a range that no hand passes in a frame it sets in without a jerk.
+GIVES_FROM = 0.82  # reach ratio beyond which the girdle takes part of the reach (fit) ...
+GIVES = 0.5  # ... in the end this part of what is added (fit) ...
+GIVES_FULLY_AFTER = 0.25  # ... over this range of the ratio (fit)
 GIVES_AT_MOST = 0.5  # half shoulder widths
 
 OVERSTRETCHED = 0.99  # reach ratio beyond which the shoulders, not the girdle, are thought to be in the wrong place
