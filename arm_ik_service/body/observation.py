@@ -12,7 +12,7 @@ from arm_ik_service.body.learning import EYES_PER_STATURE, STANDING_EYES_M
 from arm_ik_service.body.profile import Profile
 from arm_ik_service.body.state import BODY
 from arm_ik_service.body.step import initialise_body, step_body
-from arm_ik_service.compiled import inner, record_dtype
+from arm_ik_service.compiled import compiled, inner, record_dtype
 from arm_ik_service.geometry import batch
 from arm_ik_service.geometry import scalar as g
 from arm_ik_service.settings import BodySettings, TrackingSettings, to_record
@@ -87,7 +87,7 @@ def _note(seen: Any, tracking: Any, body: Any) -> None:
         seen.wrists[k, :3], seen.wrists[k, 3:] = wrist.position, wrist.rotation
 
 
-@inner
+@compiled
 def _observe(tracking: Any, body: Any, frames: Any, seen: Any, tracking_settings: Any, body_settings: Any) -> int:
     """Fill `seen` with the frames in which everything was seen; how many they are."""
     count = 0
