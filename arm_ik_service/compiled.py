@@ -36,9 +36,10 @@ def compiled(function: Function) -> Function:
 
 
 def inner(function: Function, *, inline: bool = False) -> Function:
-    """Compile `function` only as part of others: from Python it runs as Python.
+    """Compile `function` only as part of others: for private ones that nothing but compiled code calls.
 
-    The entry from Python that numba compiles for every other function is a sixth of the time of a first start.
+    From Python it runs as Python: the entry from there, which numba compiles for every other function, is a sixth of
+    the time of a first start.
     """
     if cast(Any, numba.config).DISABLE_JIT:
         return function

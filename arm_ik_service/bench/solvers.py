@@ -119,13 +119,14 @@ def _measure(
     stopped: Callable[[], bool],
 ) -> ArmResult | None:
     count, block = len(task.targets), contender.block
+    chunk = max(CHUNK, block)
     contender.begin(task._replace(targets=task.targets[:block]), tolerances, start).advance(0, min(block, count))
     run = contender.begin(task, tolerances, start)
     microseconds: list[float] = []
-    for first in range(0, count, max(CHUNK, block)):
+    for first in range(0, count, chunk):
         if stopped():
             return None
-        last = min(first + max(CHUNK, block), count)
+        last = min(first + chunk, count)
         with _no_garbage_collection():
             for at in range(first, last, block):
                 end = min(at + block, last)

@@ -64,7 +64,8 @@ def export(
     from dataclasses import asdict
 
     from arm_ik_service.io.zenoh_bus import open_client
-    from arm_ik_service.programs.exporter import Exporter, give_way
+    from arm_ik_service.programs.exporter import Exporter
+    from arm_ik_service.programs.priority import give_way
     from arm_ik_service.programs.sinks import BodyTrackingSink, Ros2Sink, VmcSink, VrChatSink
     from arm_ik_service.wire.keys import Keys
 

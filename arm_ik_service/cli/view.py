@@ -53,6 +53,7 @@ def view(
     from arm_ik_service.io.rerun_view import Connect as ConnectTo
     from arm_ik_service.io.rerun_view import Save, Sink, Spawn, Web
     from arm_ik_service.io.zenoh_bus import open_client
+    from arm_ik_service.programs.priority import give_way
     from arm_ik_service.programs.recorder import recorded_beside
     from arm_ik_service.programs.viewer import Viewer
     from arm_ik_service.wire.keys import Keys
@@ -69,6 +70,7 @@ def view(
     if record is not None and record.exists():
         raise SessionError(f"{record} exists: choose another name")
     skin, overlays = skin_options(avatar, skinning), show_option(show)
+    give_way()
     with open_client(zenoh, waiting=say) as bus, recorded_beside(bus, record, Keys(prefix)) as recorded:
         viewer = Viewer(bus, sinks, Keys(prefix), skin, overlays)
         for sink in sinks:

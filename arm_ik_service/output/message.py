@@ -155,30 +155,37 @@ def _body() -> Iterator[Step]:
 def _script() -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]]:
     literals, table = b"", []
     for step in _body():
-        table.append((len(literals), len(literals) + len(step.literal), *step[1:]))
-        literals += step.literal
-    return np.frombuffer(literals, np.uint8), np.array(table, np.int64)
+        begin = len(literals) // 8
+        literals += step.literal + b"\0" * (-len(step.literal) % 8)
+        table.append((begin, len(literals) // 8, len(step.literal), *step[1:]))
+    return np.frombuffer(literals, "<i8").astype(np.int64), np.array(table, np.int64)
 
 
-# Arguments of what is compiled, not constants in it: numba's cache would not see that a message has changed.
+# Arguments of what is compiled, not constants in it: numba's cache would not see that a message has changed. Literals
+# are whole words: what one writes too much, the next writes over.
 LITERALS, STEPS = _script()
-BODY_BYTES = len(LITERALS) + 9 * len(STEPS)  # the longest number is a byte and eight more
+BODY_BYTES = 8 * len(LITERALS) + 9 * len(STEPS)  # the longest number is a byte and eight more
 
 
 @compiled
 def write_body(numbers: Any, literals: Any, steps: Any, out: Any) -> int:
     """Write the body of the record whose `numbers` (N,) int64 these are into `out` (BODY_BYTES,); return its length."""
-    at = 0
+    at = np.uint64(0)  # of a signed index the compiler must think that it may count from the end
     for n in range(len(steps)):
-        kind, number, operand = steps[n, 2], numbers[steps[n, 3]], steps[n, 4]
+        kind, number, operand = steps[n, 3], numbers[steps[n, 4]], steps[n, 5]
         if (kind == IF_EQUAL and number != operand) or (kind == IF_BIT and not number >> operand & 1):
             continue
-        for i in range(steps[n, 0], steps[n, 1]):
-            out[at] = literals[i]
-            at += 1
+        end = at + np.uint64(steps[n, 2])
+        for word in range(steps[n, 0], steps[n, 1]):
+            for i in range(8):  # one instruction, as is the number's loop below
+                out[at + np.uint64(i)] = literals[word] >> 8 * i & 0xFF
+            at += np.uint64(8)
+        at = end
         if kind == FLOAT:
             out[at] = 0xCB
-            at = _write_number(out, at + 1, number, 8)
+            for i in range(8):
+                out[at + np.uint64(1 + i)] = number >> 8 * (7 - i) & 0xFF
+            at += np.uint64(9)
         elif kind == COUNT:
             at = _write_count(out, at, number)
         elif kind == SIZE_OF_MASK:
@@ -186,25 +193,21 @@ def write_body(numbers: Any, literals: Any, steps: Any, out: Any) -> int:
             for bit in range(15):
                 count += number >> bit & 1
             out[at] = 0x90 | count
-            at += 1
-    return at
+            at += np.uint64(1)
+    return int(at)
 
 
 @inner
-def _write_number(out: Any, at: int, number: int, size: int) -> int:
+def _write_count(out: Any, at: Any, number: int) -> Any:
+    """Write a whole number in the shortest of its forms, as msgspec does; return where it ends."""
+    size = 1
+    if number >= 0x80:
+        size, head = (1, 0xCC) if number < 0x100 else (2, 0xCD) if number < 0x10000 else (4, 0xCE)
+        out[at] = head
+        at += np.uint64(1)
     for i in range(size):
-        out[at + i] = number >> 8 * (size - 1 - i) & 0xFF
-    return at + size
-
-
-@inner
-def _write_count(out: Any, at: int, number: int) -> int:
-    """Write a whole number in the shortest of its forms, as msgspec does."""
-    if number < 0x80:
-        return _write_number(out, at, number, 1)
-    size, head = (1, 0xCC) if number < 0x100 else (2, 0xCD) if number < 0x10000 else (4, 0xCE)
-    out[at] = head
-    return _write_number(out, at + 1, number, size)
+        out[at + np.uint64(i)] = number >> 8 * (size - 1 - i) & 0xFF
+    return at + np.uint64(size)
 
 
 def read_output(output: np.ndarray[Any, Any], header: ArmsHeader) -> ArmsState:

@@ -8,7 +8,6 @@ once.
 
 from __future__ import annotations
 
-import os
 import time
 from collections import deque
 from collections.abc import Sequence
@@ -24,13 +23,6 @@ from arm_ik_service.wire.keys import Keys
 from arm_ik_service.wire.messages import ArmsState, ControllerFrame
 
 REMEMBERED = 32  # frames of an avatar that may wait for their answer
-NICENESS = 10  # halfway to the least: a service and its clients are scheduled first
-
-
-def give_way() -> None:
-    """Lower the priority of this process, where the system knows such a thing."""
-    if hasattr(os, "nice"):
-        os.nice(NICENESS)
 
 
 @dataclass

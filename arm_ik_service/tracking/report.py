@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from arm_ik_service.compiled import inner, record_dtype
+from arm_ik_service.compiled import compiled, inner, record_dtype
 from arm_ik_service.geometry import scalar as g
 from arm_ik_service.settings import TrackingSettings, to_record
 from arm_ik_service.tracking.state import ACCEPTED, HELD, INFERRED, LOST, TRACKED, TRACKING
@@ -79,7 +79,7 @@ def _note_device(row: Any, k: int, device: Any, glitches_before: int) -> None:
     row.glitched[k] = device.glitches > glitches_before
 
 
-@inner
+@compiled
 def _watch(tracking: Any, frames: Any, receive_times_ns: Any, rows: Any, settings: Any) -> None:
     for i in range(len(frames)):
         head, left, right = tracking.head.glitches, tracking.hands[0].glitches, tracking.hands[1].glitches
