@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from arm_ik_service.arm.model import ArmModel
+from arm_ik_service.body.grip import learn_grip
 from arm_ik_service.body.profile import BodyMeasures, Profile
 from arm_ik_service.body.state import BODY
 from arm_ik_service.body.step import initialise_body, step_body
@@ -83,6 +84,7 @@ def step_batch(
             step_arm(arm, row.body.targets[side], row.tracking.dt_s, settings.solver)
             if task.ahead_s > 0.0:
                 show_ahead(arm, task.ahead_s)
+        learn_grip(row.body, row.tracking, row.arms, row.tracking.interval_s)
         write_output(outputs[k], row.tracking, row.body, row.arms)
         task.body_bytes = write_body(outputs_memory[k * numbers : (k + 1) * numbers], literals, steps, bodies[k])
 
@@ -163,6 +165,13 @@ class Avatars:
         """Return stature, upper arm, forearm and half the shoulders' width (N, 4) of the people in these rows [m]."""
         body = self._rows["body"]
         return np.stack([body[name][indices] for name in ("stature", "upper_arm", "forearm", "half_width")], axis=-1)
+
+    def grip_turn(self, index: int) -> Array:
+        """Return how far the right hand of the person in row `index` was found to be turned on its controller.
+
+        A rotation vector (3,) [rad] in the wrist frame that the profile says; the left hand's is its mirror image.
+        """
+        return np.array(self._rows[index]["body"]["grip"]["turn"])
 
     def _arms(self, profile: Profile) -> tuple[ArmModel, ArmModel]:
         models = self._models.get(profile)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from arm_ik_service.body.grip import GRIP
 from arm_ik_service.body.learning import LEARNING
 from arm_ik_service.compiled import record_dtype
 
@@ -28,7 +29,7 @@ BODY = record_dtype(
         ("upper_arm", np.float64),
         ("forearm", np.float64),
         ("half_width", np.float64),  # of the shoulders
-        ("grip_from_wrist", POSE, (2,)),
+        ("grip_from_wrist", POSE, (2,)),  # as the profile has it
         # the answer, in world axes; left, right
         ("head_position", np.float64, (3,)),
         ("head_rotation", np.float64, (4,)),
@@ -49,6 +50,7 @@ BODY = record_dtype(
         ("tilt", FOLLOWER),  # the chest's up over its y, in axes that share its yaw
         ("recentres", np.int64),  # of tracking, that the memory in world axes was moved along with
         ("learning", LEARNING),
+        ("grip", GRIP),
         ("settled", np.float64),  # how far the shoulders have been found to sit below where they were thought to be
     ]
 )

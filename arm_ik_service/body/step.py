@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from arm_ik_service.body.chest import step_chest
+from arm_ik_service.body.grip import initialise_grip, mirrored_turn
 from arm_ik_service.body.learning import initialise_learning, learn
 from arm_ik_service.body.profile import GripOffset, Profile
 from arm_ik_service.body.reach import soft_reach
@@ -31,6 +32,7 @@ def initialise_body(body: Record, profile: Profile) -> None:
     body.arm_length = body.upper_arm + body.forearm
     body.half_width = 0.5 * profile.body.shoulder_width
     initialise_learning(body, profile)
+    initialise_grip(body.grip, profile)
     for k, offset in enumerate((profile.grip.left, profile.grip.right)):
         pose = _inverse_offset(offset)
         body.grip_from_wrist[k].position[:], body.grip_from_wrist[k].rotation[:] = pose[:3], pose[3:]
@@ -45,8 +47,11 @@ def initialise_body(body: Record, profile: Profile) -> None:
 def _place_wrist(body: Record, tracking: Record, k: int) -> None:
     hand, grip_from_wrist = tracking.hands[k], body.grip_from_wrist[k]
     world_from_grip = g.quaternion(hand.rotation)
-    offset = g.rotate(world_from_grip, g.vector(grip_from_wrist.position))
-    rotation = g.multiply(world_from_grip, g.quaternion(grip_from_wrist.rotation))
+    assumed = g.multiply(world_from_grip, g.quaternion(grip_from_wrist.rotation))
+    rotation = g.multiply(assumed, g.exp(mirrored_turn(g.vector(body.grip.turn), k)))
+    # the grip stays where it is in the hand, however that is turned
+    in_wrist = g.rotate(g.conjugate(g.quaternion(grip_from_wrist.rotation)), g.vector(grip_from_wrist.position))
+    offset = g.rotate(rotation, in_wrist)
     g.store(body.wrists[k].position, g.add(g.vector(hand.position), offset))
     g.store(body.wrists[k].rotation, g.normalized(rotation))
 
