@@ -100,28 +100,3 @@ def test_the_pure_stages_know_no_clock_no_file_and_no_thread() -> None:
             if module == "arm.model":  # it reads the description of the arm, once
                 used -= {"pathlib"}
             assert not used, f"{module} imports {used}"
-
-
-def functions(node: ast.AST) -> Iterator[ast.FunctionDef]:
-    return (child for child in ast.walk(node) if isinstance(child, ast.FunctionDef))
-
-
-def decorated(function: ast.FunctionDef) -> set[str]:
-    return {decorator.id for decorator in function.decorator_list if isinstance(decorator, ast.Name)}
-
-
-@pytest.mark.parametrize(("module", "path"), MODULES, ids=[module for module, _ in MODULES])
-def test_what_is_compiled_only_inside_other_functions_is_called_by_compiled_ones_alone(module: str, path: Path) -> None:
-    """From Python it would run as Python: a loop over a session's frames, several times slower and nobody the wiser."""
-    tree = ast.parse(path.read_text())
-    inner = {function.name for function in functions(tree) if "inner" in decorated(function)}
-    assert all(name.startswith("_") for name in inner), f"{module}: others could call it"
-    for function in functions(tree):
-        if decorated(function) & {"compiled", "inner", "inlined"}:
-            continue
-        called = {
-            call.func.id
-            for call in ast.walk(function)
-            if isinstance(call, ast.Call) and isinstance(call.func, ast.Name)
-        }
-        assert not called & inner, f"{module}.{function.name} calls {called & inner}"

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from arm_ik_service.compiled import Record, compiled, inlined, inner, record_dtype
+from arm_ik_service.compiled import Record, compiled, inlined, record_dtype
 from arm_ik_service.geometry.scalar import (
     Quaternion,
     Vector,
@@ -166,7 +166,7 @@ def bone_from_arm(chain: Record, q: Quaternion) -> Quaternion:
     return multiply((s[0], s[1], s[2], s[3]), q)
 
 
-@inner
+@compiled
 def _mirror_isb(q: Quaternion) -> Quaternion:
     """Reflect a rotation given in ISB axes in the sagittal plane z = 0."""
     return (-q[0], -q[1], q[2], q[3])

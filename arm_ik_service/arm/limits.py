@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 
 from arm_ik_service.arm.chain import Columns, columns_of
-from arm_ik_service.compiled import Record, compiled, inlined, inner
+from arm_ik_service.compiled import Record, compiled, inlined
 from arm_ik_service.geometry.scalar import (
     Quaternion,
     Vector,
@@ -39,7 +39,7 @@ def twist_of(bone: Columns) -> float:
     return angle_of(bone[2][0] - bone[0][2], bone[0][0] + bone[2][2])
 
 
-@inner
+@compiled
 def _opening(height: float) -> float:
     """How far the twist range has opened: 0 below _OPENS_AT, 1 above _OPEN_AT."""
     s = clip((height - _OPENS_AT) / (_OPEN_AT - _OPENS_AT), 0.0, 1.0)

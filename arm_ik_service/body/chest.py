@@ -11,7 +11,7 @@ import math
 
 from arm_ik_service.body.follow import follow, followed_rate, predicted_follow, settled_time, start_at
 from arm_ik_service.body.state import ARM_LENGTH_OF_FIT
-from arm_ik_service.compiled import Record, compiled, inner
+from arm_ik_service.compiled import Record, compiled
 from arm_ik_service.geometry import scalar as g
 from arm_ik_service.geometry.scalar import Quaternion, Vector
 
@@ -36,7 +36,7 @@ LARGEST_TURN_RAD = 0.33  # in a frame, whatever its length ...
 RECENTRED_RAD = 0.5  # ... unless the space turned by more than this: less may be the pop of a whole recording
 
 
-@inner
+@compiled
 def _pull(weight: float, x: float, z: float, arm_length: float) -> Vector:
     """Horizontal vector of length `weight` for an arm's length and more, in proportion below."""
     s = weight / max(math.sqrt(x * x + z * z), arm_length)
@@ -68,7 +68,7 @@ def facing(body: Record, neck: Vector, head: Quaternion, yaw: float) -> Vector:
     return total
 
 
-@inner
+@compiled
 def _turn(body: Record, direction: Vector, recentred: float, elapsed_s: float) -> None:
     yaw = math.atan2(-direction[0], -direction[2])
     if body.started == 0:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from arm_ik_service.body.profile import BodyMeasures, Profile
-from arm_ik_service.compiled import Record, compiled, inner, record_dtype
+from arm_ik_service.compiled import Record, compiled, record_dtype
 from arm_ik_service.geometry import scalar as g
 
 EYES_PER_STATURE = 0.936  # eye height over stature: Drillis & Contini (1966)
@@ -55,7 +55,7 @@ def initialise_learning(body: Record, profile: Profile) -> None:
     body["stature"] = measures.stature_m
 
 
-@inner
+@compiled
 def _learn_stature(body: Record, eyes_m: float, elapsed_s: float) -> None:
     learning = body.learning
     pace = EYES_M_S * elapsed_s / (1.0 + learning.watched_s / EYES_SETTLE_AFTER_S)
@@ -66,7 +66,7 @@ def _learn_stature(body: Record, eyes_m: float, elapsed_s: float) -> None:
         body.half_width = HALF_WIDTH_PER_STATURE * body.stature
 
 
-@inner
+@compiled
 def _learn_length(body: Record, k: int, elapsed_s: float) -> None:
     side = -1.0 if k == 0 else 1.0
     lateral = g.rotate(g.quaternion(body.chest_rotation), (side * body.half_width, 0.0, 0.0))

@@ -12,7 +12,7 @@ from arm_ik_service.body.learning import EYES_PER_STATURE, STANDING_EYES_M
 from arm_ik_service.body.profile import Profile
 from arm_ik_service.body.state import BODY
 from arm_ik_service.body.step import initialise_body, step_body
-from arm_ik_service.compiled import compiled, inner, record_dtype
+from arm_ik_service.compiled import compiled, record_dtype
 from arm_ik_service.geometry import batch
 from arm_ik_service.geometry import scalar as g
 from arm_ik_service.settings import BodySettings, TrackingSettings, to_record
@@ -66,7 +66,7 @@ _SEEN = record_dtype(
 )
 
 
-@inner
+@compiled
 def _all_seen(tracking: Any) -> bool:
     seen = tracking.head.position_age_s == 0.0 and tracking.head.rotation_age_s == 0.0
     for k in range(2):
@@ -75,16 +75,16 @@ def _all_seen(tracking: Any) -> bool:
     return bool(seen)
 
 
-@inner
+@compiled
 def _note(seen: Any, tracking: Any, body: Any) -> None:
     seen.t = 1e-9 * tracking.sample_time_ns
     seen.eye_height_m = tracking.head.position[1]
-    seen.chest[:3], seen.chest[3:] = body.chest_position, body.chest_rotation
+    g.store_pose(seen.chest, g.vector(body.chest_position), g.quaternion(body.chest_rotation))
     for k in range(2):
         hand, wrist = tracking.hands[k], body.wrists[k]
         seen.hand_speed[k] = g.norm(g.vector(hand.linear_velocity))
-        seen.grips[k, :3], seen.grips[k, 3:] = hand.position, hand.rotation
-        seen.wrists[k, :3], seen.wrists[k, 3:] = wrist.position, wrist.rotation
+        g.store_pose(seen.grips[k], g.vector(hand.position), g.quaternion(hand.rotation))
+        g.store_pose(seen.wrists[k], g.vector(wrist.position), g.quaternion(wrist.rotation))
 
 
 @compiled

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from arm_ik_service.compiled import Record, compiled, inner
+from arm_ik_service.compiled import Record, compiled
 from arm_ik_service.geometry import scalar as g
 from arm_ik_service.geometry.scalar import Vector
 
@@ -35,7 +35,7 @@ def girdle_gives(ratio: float) -> float:
     return GIVES * (0.5 * x * x / w if x < w else x - 0.5 * w)
 
 
-@inner
+@compiled
 def _shoulder_in_chest(side: float, half_width: float, arm_length: float, wrist: Vector) -> Vector:
     """Glenohumeral joint in the chest's frame for a wrist there."""
     shoulder = (side * half_width, 0.0, 0.0)

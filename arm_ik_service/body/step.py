@@ -12,7 +12,7 @@ from arm_ik_service.body.profile import GripOffset, Profile
 from arm_ik_service.body.reach import soft_reach
 from arm_ik_service.body.shoulders import settle, step_shoulder
 from arm_ik_service.body.state import BODY
-from arm_ik_service.compiled import Record, compiled, inner
+from arm_ik_service.compiled import Record, compiled
 from arm_ik_service.geometry import batch
 from arm_ik_service.geometry import scalar as g
 
@@ -43,7 +43,7 @@ def initialise_body(body: Record, profile: Profile) -> None:
             pose_record.rotation[:] = g.IDENTITY
 
 
-@inner
+@compiled
 def _place_wrist(body: Record, tracking: Record, k: int) -> None:
     hand, grip_from_wrist = tracking.hands[k], body.grip_from_wrist[k]
     world_from_grip = g.quaternion(hand.rotation)
@@ -56,7 +56,7 @@ def _place_wrist(body: Record, tracking: Record, k: int) -> None:
     g.store(body.wrists[k].rotation, g.normalized(rotation))
 
 
-@inner
+@compiled
 def _set_target(body: Record, k: int, dt_s: float, settings: Record) -> None:
     target, wrist = body.targets[k], body.wrists[k]
     shoulder_from_world = g.conjugate(g.quaternion(body.chest_rotation))

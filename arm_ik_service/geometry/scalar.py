@@ -40,6 +40,15 @@ def store(out: Any, value: Any) -> None:
         out[i] = value[i]
 
 
+@compiled
+def store_pose(out: Any, position: Vector, rotation: Quaternion) -> None:
+    """Write a pose x y z qx qy qz qw into an array (7,), in place."""
+    for i in range(3):
+        out[i] = position[i]
+    for i in range(4):
+        out[3 + i] = rotation[i]
+
+
 @inlined
 def add(a: Vector, b: Vector) -> Vector:
     """a + b."""

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from arm_ik_service.arm.chain import Columns, columns_of, hand_to_arm, position_to_arm
 from arm_ik_service.arm.model import ANGLES, ArmModel
-from arm_ik_service.compiled import Record, compiled, inner
+from arm_ik_service.compiled import Record, compiled
 from arm_ik_service.geometry.scalar import Vector, dot, quaternion, vector
 from arm_ik_service.ik.comfort import COMFORT, discomfort, learn_habit
 from arm_ik_service.ik.swivel import Reach, reach_to, side_at
@@ -29,7 +29,7 @@ COMFORTABLE = 0.05
 _FLEXION, _DEVIATION = ANGLES.index("wrist_flexion"), ANGLES.index("wrist_deviation")
 
 
-@inner
+@compiled
 def _end(
     comfort: Any, habit: Any, chain: Record, reach: Reach, rotation: Columns, start: float, step: float, least: float
 ) -> float:

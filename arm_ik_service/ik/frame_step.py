@@ -21,7 +21,7 @@ from arm_ik_service.arm import tangent
 from arm_ik_service.arm.chain import Columns, columns_of, wrist_at
 from arm_ik_service.arm.configuration import integrate, read_configuration, store_configuration
 from arm_ik_service.arm.tangent import Tangent
-from arm_ik_service.compiled import Record, compiled, inlined, inner
+from arm_ik_service.compiled import Record, compiled, inlined
 from arm_ik_service.geometry.scalar import Vector, clip, components, norm, scale, subtract, wrap
 from arm_ik_service.geometry.trigonometry import angle_of
 from arm_ik_service.ik.clock import monotonic_ns
@@ -270,7 +270,7 @@ def _finished(status: int) -> bool:
     return status in (SOLVED, OUT_OF_TIME)
 
 
-@inner
+@compiled
 def _start_again(
     arm: Record,
     settings: Record,

@@ -21,7 +21,7 @@ from arm_ik_service.arm.limits import (
     twist_surely_inside,
 )
 from arm_ik_service.arm.tangent import Tangent
-from arm_ik_service.compiled import Record, inlined, inner
+from arm_ik_service.compiled import Record, compiled, inlined
 from arm_ik_service.geometry.scalar import Vector, dot, largest, scale, subtract, times
 
 AT_LIMIT = 1e-9  # [rad]
@@ -64,12 +64,12 @@ def rests(walls: Walls) -> bool:
     return largest(a) > 0.0 or largest(b) > 0.0 or largest(c) > 0.0 or largest(d) > 0.0
 
 
-@inner
+@compiled
 def _swing_wall(chain: Record, bone: Columns) -> Vector:
     return swing_gradient(chain, bone) if swing_excess(chain, scale(-1.0, bone[1])) > -AT_LIMIT else FREE
 
 
-@inner
+@compiled
 def _twist_wall(chain: Record, q: Configuration, bone: Columns) -> Vector:
     twist, height = twist_of(bone), -bone[1][1]
     if twist_excess(chain, twist - AT_LIMIT, height) < 0.0:

@@ -122,7 +122,8 @@ def _track(
     arm, setting = arms[0], settings[0]
     chain, work = arm.chain, arm.work
     arm.swivel_speed, arm.escape, arm.steady, work.position_error_m = 0.0, 0.0, 0, 0.0
-    arm.habit[:] = 0.0
+    for i in range(len(arm.habit)):
+        arm.habit[i] = 0.0
     for i in range(10):
         arm.configuration[i] = start[i]
     for n in range(len(targets)):

@@ -18,7 +18,7 @@ from arm_ik_service.arm.chain import (
 )
 from arm_ik_service.arm.configuration import difference, integrate, read_configuration, store_configuration
 from arm_ik_service.arm.limits import swing_excess, swing_surely_inside, twist_excess, twist_of
-from arm_ik_service.compiled import Record, compiled, inner
+from arm_ik_service.compiled import Record, compiled
 from arm_ik_service.geometry.scalar import clip, quaternion, scale, store, vector
 from arm_ik_service.ik.conjugate import SOLVED
 from arm_ik_service.ik.frame_step import first_frame, step_frame
@@ -62,7 +62,7 @@ def show_ahead(arm: Record, ahead_s: float) -> None:
     _show(arm)
 
 
-@inner
+@compiled
 def _move_on(arm: Record, settings: Record, linear: Any, angular: Any, dt_s: float) -> None:
     """Find the joint velocity: recent motion carried on, corrected by the hand's twist, scaled to speed limits."""
     chain, q = arm.chain, read_configuration(arm.configuration)
@@ -110,7 +110,7 @@ def limits_at(chain: Record, configuration: Any) -> int:
     return mask
 
 
-@inner
+@compiled
 def _show(arm: Record) -> None:
     """Fill what is read off the published configuration."""
     chain, work = arm.chain, arm.work

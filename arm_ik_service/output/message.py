@@ -14,7 +14,7 @@ import msgspec
 import numpy as np
 
 from arm_ik_service.arm.model import LIMITS
-from arm_ik_service.compiled import compiled, inner
+from arm_ik_service.compiled import compiled
 from arm_ik_service.output.record import OUTPUT
 from arm_ik_service.wire import codec
 from arm_ik_service.wire.messages import (
@@ -197,7 +197,7 @@ def write_body(numbers: Any, literals: Any, steps: Any, out: Any) -> int:
     return int(at)
 
 
-@inner
+@compiled
 def _write_count(out: Any, at: Any, number: int) -> Any:
     """Write a whole number in the shortest of its forms, as msgspec does; return where it ends."""
     size = 1

@@ -35,35 +35,26 @@ OUTPUT = record_dtype([("chest", *_POSE), ("head", *_POSE), ("arms", record_dtyp
 
 
 @compiled
-def store_pose(out: Any, position: g.Vector, rotation: g.Quaternion) -> None:
-    """Write a pose (7,) x y z qx qy qz qw in place."""
-    for i in range(3):
-        out[i] = position[i]
-    for i in range(4):
-        out[3 + i] = rotation[i]
-
-
-@compiled
 def write_output(out: Record, tracking: Record, body: Record, arms: Any) -> None:
     """Gather one avatar's published state in world axes; residuals are against the raw, unclamped target."""
     chest = g.quaternion(body.chest_rotation)
-    store_pose(out.chest, g.vector(body.chest_position), chest)
-    store_pose(out.head, g.vector(body.head_position), g.quaternion(body.head_rotation))
+    g.store_pose(out.chest, g.vector(body.chest_position), chest)
+    g.store_pose(out.head, g.vector(body.head_position), g.quaternion(body.head_rotation))
     for side in range(2):
         arm, written, hand = arms[side], out.arms[side], tracking.hands[side]
         shoulder = g.vector(body.shoulders[side])
         wrist = g.add(shoulder, g.rotate(chest, g.vector(arm.wrist)))
         hand_rotation = g.multiply(chest, g.quaternion(arm.hand_rotation))
-        store_pose(
+        g.store_pose(
             written.clavicle, g.vector(body.clavicles[side].position), g.quaternion(body.clavicles[side].rotation)
         )
-        store_pose(written.upper_arm, shoulder, g.multiply(chest, g.quaternion(arm.upper_arm_rotation)))
-        store_pose(
+        g.store_pose(written.upper_arm, shoulder, g.multiply(chest, g.quaternion(arm.upper_arm_rotation)))
+        g.store_pose(
             written.forearm,
             g.add(shoulder, g.rotate(chest, g.vector(arm.elbow))),
             g.multiply(chest, g.quaternion(arm.forearm_rotation)),
         )
-        store_pose(written.hand, wrist, hand_rotation)
+        g.store_pose(written.hand, wrist, hand_rotation)
         asked = body.wrists[side]
         written.position_error_m = g.norm(g.subtract(g.vector(asked.position), wrist))
         written.orientation_error_rad = g.norm(

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from arm_ik_service.compiled import Record, compiled, inner
+from arm_ik_service.compiled import Record, compiled
 from arm_ik_service.geometry import scalar as g
 from arm_ik_service.geometry.scalar import Quaternion, Vector
 from arm_ik_service.tracking.glitch import agreeing_moves, gate_interval_s, human_move, human_turn, suspect
@@ -22,44 +22,44 @@ VELOCITY_TIME_S = 0.01  # of the published velocities' low pass
 LONGEST_STEP_S = 0.1  # for the filters; after a longer gap they follow at once anyway
 
 
-@inner
+@compiled
 def _source(quality: int, settings: Record) -> int:
     """What to follow of a sample of this quality: LOST for nothing."""
     return LOST if quality == INFERRED and settings.dead_reckoning != FOLLOW else quality
 
 
-@inner
+@compiled
 def _state(source: int, followed: bool, age_s: float, settings: Record) -> int:
     if followed:
         return source
     return LOST if age_s > settings.lost_after_s else HELD
 
 
-@inner
+@compiled
 def _continued(before: Quaternion, after: Quaternion) -> Quaternion:
     """Return `after` with the sign that makes it the nearer neighbour of `before`."""
     inner = before[0] * after[0] + before[1] * after[1] + before[2] * after[2] + before[3] * after[3]
     return after if inner >= 0.0 else (-after[0], -after[1], -after[2], -after[3])
 
 
-@inner
+@compiled
 def _low_pass(velocity: Vector, sample: Vector, dt_s: float) -> Vector:
     return g.lerp(velocity, sample, 1.0 - math.exp(-dt_s / VELOCITY_TIME_S))
 
 
-@inner
+@compiled
 def _left_of(velocity: Vector, state: int) -> Vector:
     """Velocity that a hand in this state goes on with when no data comes."""
     return velocity if state != LOST else (0.0, 0.0, 0.0)
 
 
-@inner
+@compiled
 def _coasted(velocity: Vector, dt_s: float) -> Vector:
     """Way [m or rad] that is still made in `dt_s` without data."""
     return g.scale(COASTS_FOR_S * (1.0 - math.exp(-dt_s / COASTS_FOR_S)), velocity)
 
 
-@inner
+@compiled
 def _follow_position(
     device: Record, position: Vector, source: int, elapsed_s: float, period_s: float, settings: Record
 ) -> bool:
@@ -86,7 +86,7 @@ def _follow_position(
     return True
 
 
-@inner
+@compiled
 def _step_position(device: Record, sample: Record, elapsed_s: float, period_s: float, settings: Record) -> None:
     channel, before, velocity = device.position_channel, g.vector(device.position), g.vector(device.linear_velocity)
     source = _source(position_quality(sample), settings)
@@ -109,7 +109,7 @@ def _step_position(device: Record, sample: Record, elapsed_s: float, period_s: f
     device.position_state = _state(source, followed, device.position_age_s, settings)
 
 
-@inner
+@compiled
 def _follow_rotation(
     device: Record, rotation: Quaternion, source: int, elapsed_s: float, period_s: float, settings: Record
 ) -> bool:
@@ -138,7 +138,7 @@ def _follow_rotation(
     return True
 
 
-@inner
+@compiled
 def _step_rotation(device: Record, sample: Record, elapsed_s: float, period_s: float, settings: Record) -> None:
     channel, before, velocity = (
         device.rotation_channel,

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from arm_ik_service.compiled import Record, compiled, inner
+from arm_ik_service.compiled import Record, compiled
 from arm_ik_service.geometry import scalar as g
 from arm_ik_service.geometry.scalar import Quaternion, Vector
 
@@ -29,7 +29,7 @@ def gate_interval_s(elapsed_s: float, period_s: float) -> float:
     return max(elapsed_s, LEAST_INTERVAL * period_s)
 
 
-@inner
+@compiled
 def _predicted(channel: Record, after_s: float) -> Vector:
     return g.add(g.vector(channel.measured), g.scale(min(after_s, PREDICTS_FOR_S), g.vector(channel.rate)))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from arm_ik_service.compiled import Record, compiled, inner
+from arm_ik_service.compiled import Record, compiled
 from arm_ik_service.geometry import scalar as g
 from arm_ik_service.geometry.scalar import Quaternion, Vector
 from arm_ik_service.tracking.glitch import PREDICTS_FOR_S
@@ -17,18 +17,18 @@ HANDS_AGREE_M, HANDS_AGREE_M_S = 0.05, 3.0  # how well the hands must fit the mo
 HANDS_AGREE_PART = 0.5  # ... and by which part of their own jump
 
 
-@inner
+@compiled
 def _predicted(device: Record, elapsed_s: float) -> Vector:
     channel = device.position_channel
     return g.add(g.vector(channel.measured), g.scale(min(elapsed_s, PREDICTS_FOR_S), g.vector(channel.rate)))
 
 
-@inner
+@compiled
 def _is_followed(device: Record, sample: Record) -> bool:
     return bool(device.position_channel.source == TRACKED and position_quality(sample) == TRACKED)
 
 
-@inner
+@compiled
 def _hands_agree(tracking: Record, frame: Record, old: Vector, new: Vector, turn: Quaternion, elapsed_s: float) -> bool:
     agreeing = 0
     for k in range(2):
@@ -43,7 +43,7 @@ def _hands_agree(tracking: Record, frame: Record, old: Vector, new: Vector, turn
     return agreeing > 0
 
 
-@inner
+@compiled
 def _move_device(device: Record, old: Vector, new: Vector, turn: Quaternion) -> None:
     place, spin = device.position_channel, device.rotation_channel
     for position in (device.position, place.measured, place.suspect, place.smooth):

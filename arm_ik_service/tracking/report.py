@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from arm_ik_service.compiled import compiled, inner, record_dtype
+from arm_ik_service.compiled import compiled, record_dtype
 from arm_ik_service.geometry import scalar as g
 from arm_ik_service.settings import TrackingSettings, to_record
 from arm_ik_service.tracking.state import ACCEPTED, HELD, INFERRED, LOST, TRACKED, TRACKING
@@ -70,7 +70,7 @@ class SessionReport:
     devices: dict[str, DeviceReport]
 
 
-@inner
+@compiled
 def _note_device(row: Any, k: int, device: Any, glitches_before: int) -> None:
     row.speed[k] = g.norm(g.vector(device.position_channel.rate))
     row.turn_rate[k] = g.norm(g.vector(device.rotation_channel.rate))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from arm_ik_service.compiled import Record, compiled, inner
+from arm_ik_service.compiled import Record, compiled
 from arm_ik_service.geometry import scalar as g
 from arm_ik_service.geometry.scalar import Quaternion, Vector
 from arm_ik_service.tracking.state import HANDS_AT_REST, LOST, NEVER_S
@@ -37,13 +37,13 @@ def turn_person(tracking: Record, elapsed_s: float) -> float:
     return turn
 
 
-@inner
+@compiled
 def _share(distance: float, fastest: float, elapsed_s: float) -> float:
     part = 1.0 - math.exp(-elapsed_s / FADES_FOR_S)
     return min(part, fastest * elapsed_s / max(distance, 1e-9))
 
 
-@inner
+@compiled
 def _approach_position(device: Record, goal: Vector, elapsed_s: float) -> None:
     way = g.subtract(goal, g.vector(device.position))
     step = g.scale(_share(g.norm(way), FASTEST_M_S, elapsed_s), way)
@@ -51,7 +51,7 @@ def _approach_position(device: Record, goal: Vector, elapsed_s: float) -> None:
     g.store(device.linear_velocity, g.scale(1.0 / elapsed_s, step))
 
 
-@inner
+@compiled
 def _approach_rotation(device: Record, goal: Quaternion, elapsed_s: float) -> None:
     way = g.log(g.multiply(goal, g.conjugate(g.quaternion(device.rotation))))
     step = g.scale(_share(g.norm(way), FASTEST_RAD_S, elapsed_s), way)
@@ -59,7 +59,7 @@ def _approach_rotation(device: Record, goal: Quaternion, elapsed_s: float) -> No
     g.store(device.angular_velocity, g.scale(1.0 / elapsed_s, step))
 
 
-@inner
+@compiled
 def _carry_position(hand: Record, head_before: Vector, head: Vector, turn: Quaternion) -> None:
     away = g.rotate(turn, g.subtract(g.vector(hand.position), head_before))
     g.store(hand.position, g.add(head, away))

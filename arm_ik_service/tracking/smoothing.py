@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from arm_ik_service.compiled import Record, compiled, inner
+from arm_ik_service.compiled import Record, compiled
 from arm_ik_service.geometry import scalar as g
 from arm_ik_service.geometry.scalar import Quaternion, Vector
 
@@ -26,12 +26,12 @@ POSITION_FILTERS = ((0.0, 0.0, 0.0, 0.0), (1.6, 400.0, 0.06, 0.003), (0.8, 30.0,
 ROTATION_FILTERS = ((0.0, 0.0, 0.0, 0.0), (1.6, 100.0, 0.3, 0.02), (0.8, 10.0, 0.2, 0.1))
 
 
-@inner
+@compiled
 def _gain(cutoff_hz: float, dt_s: float) -> float:
     return 1.0 - 1.0 / (1.0 + 2.0 * math.pi * cutoff_hz * dt_s)
 
 
-@inner
+@compiled
 def _adaptive_gain(channel: Record, filters: Any, level: int, away: float, dt_s: float) -> float:
     """Update the slope; the gain to follow a sample with that is `away` [m, rad] from the output."""
     rest_hz, rise, threshold, leash = filters[level]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from arm_ik_service.compiled import Record, compiled, inner
+from arm_ik_service.compiled import Record, compiled
 from arm_ik_service.tracking.state import INFERRED, LOST, TRACKED
 from arm_ik_service.wire.messages import (
     ORIENTATION_TRACKED,
@@ -18,13 +18,13 @@ FARTHEST_M = 1000.0  # from the origin, along each axis: no tracked space is lar
 NORM_TOLERANCE = 0.02  # of a quaternion; rounded to two decimals it is off by at most this
 
 
-@inner
+@compiled
 def _position_is_plausible(position: Any) -> bool:
     farthest = FARTHEST_M
     return bool(abs(position[0]) <= farthest and abs(position[1]) <= farthest and abs(position[2]) <= farthest)
 
 
-@inner
+@compiled
 def _rotation_is_plausible(rotation: Any) -> bool:
     x, y, z, w = rotation[0], rotation[1], rotation[2], rotation[3]
     if not (abs(x) < 2.0 and abs(y) < 2.0 and abs(z) < 2.0 and abs(w) < 2.0):
@@ -32,7 +32,7 @@ def _rotation_is_plausible(rotation: Any) -> bool:
     return bool(abs(math.sqrt(x * x + y * y + z * z + w * w) - 1.0) <= NORM_TOLERANCE)
 
 
-@inner
+@compiled
 def _was_filled_in(sample: Record) -> bool:
     """Senders that have nothing yet send a pose of zeros; one that is real has a rotation."""
     position = sample.position
