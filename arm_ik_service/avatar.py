@@ -84,7 +84,8 @@ def step_batch(
             step_arm(arm, row.body.targets[side], row.tracking.dt_s, settings.solver)
             if task.ahead_s > 0.0:
                 show_ahead(arm, task.ahead_s)
-        learn_grip(row.body, row.tracking, row.arms, row.tracking.interval_s)
+        if settings.body.learns:
+            learn_grip(row.body, row.tracking, row.arms, row.tracking.interval_s)
         write_output(outputs[k], row.tracking, row.body, row.arms)
         task.body_bytes = write_body(outputs_memory[k * numbers : (k + 1) * numbers], literals, steps, bodies[k])
 

@@ -43,7 +43,7 @@ def _pull(weight: float, x: float, z: float, arm_length: float) -> Vector:
     return (s * x, 0.0, s * z)
 
 
-@inner
+@compiled
 def _step_forearms(body: Record, yaw: float, elapsed_s: float) -> None:
     """Update where each elbow is by the hand alone. A wrist that flicks turns no chest, one that stays bent does."""
     upright = g.rotation_y(-yaw)
@@ -84,7 +84,7 @@ def _turn(body: Record, direction: Vector, recentred: float, elapsed_s: float) -
     body.yaw = g.wrap(body.yaw + turn)
 
 
-@inner
+@compiled
 def _steady_neck(body: Record, asked: Vector, tracking: Record, elapsed_s: float) -> Vector:
     """Return the neck without its trembling."""
     if body.started == 0:
@@ -100,7 +100,7 @@ def _steady_neck(body: Record, asked: Vector, tracking: Record, elapsed_s: float
     return g.vector(body.neck.at)
 
 
-@inner
+@compiled
 def _tilted(body: Record, head: Quaternion, elapsed_s: float) -> Quaternion:
     """Return the rotation of the chest: its yaw, and the part of the head's pitch and roll that it takes."""
     upright = g.rotation_y(body.yaw)

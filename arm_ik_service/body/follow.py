@@ -13,18 +13,18 @@ from __future__ import annotations
 
 import math
 
-from arm_ik_service.compiled import Record, inner
+from arm_ik_service.compiled import Record, compiled
 from arm_ik_service.geometry import scalar as g
 from arm_ik_service.geometry.scalar import Vector
 
 
-@inner
+@compiled
 def settled_time(time_s: float, since_s: float) -> float:
     """Time constant of a follower that started `since_s` ago: it takes up the motion that it finds, without a jolt."""
     return max(min(time_s, since_s), 1e-6)
 
 
-@inner
+@compiled
 def followed_rate(rate: float, away: float, trails_s: float, elapsed_s: float) -> float:
     """Rate of a critically damped follower that is `away` from its goal and trails a steady motion by `trails_s`.
 
@@ -34,7 +34,7 @@ def followed_rate(rate: float, away: float, trails_s: float, elapsed_s: float) -
     return (rate + stiff * stiff / elapsed_s * away) / (1.0 + 2.0 * stiff + stiff * stiff)
 
 
-@inner
+@compiled
 def follow(follower: Record, goal: Vector, trails_s: float, since_s: float, elapsed_s: float) -> Vector:
     """Move a FOLLOWER that started `since_s` ago on towards `goal`; where it is then."""
     trails_s = settled_time(trails_s, since_s)
@@ -45,7 +45,7 @@ def follow(follower: Record, goal: Vector, trails_s: float, since_s: float, elap
     return g.vector(follower.at)
 
 
-@inner
+@compiled
 def predicted_follow(follower: Record, goal: Vector, time_s: float, since_s: float, elapsed_s: float) -> Vector:
     """The same without a delay in steady motion, by a fading memory of `time_s` (an alpha-beta filter)."""
     keeps = math.exp(-elapsed_s / settled_time(time_s, since_s))
@@ -57,7 +57,7 @@ def predicted_follow(follower: Record, goal: Vector, time_s: float, since_s: flo
     return g.vector(follower.at)
 
 
-@inner
+@compiled
 def start_at(follower: Record, goal: Vector) -> None:
     """Put a FOLLOWER at rest where its goal is."""
     g.store(follower.at, goal)
