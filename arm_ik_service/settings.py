@@ -35,7 +35,7 @@ class BodySettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     # part of the straight arm at which the soft reach clamp sets in; it costs 3 mm at full reach, 1 makes it a hard one
     soft_reach_from: Annotated[float, Meta(gt=0.5, le=1.0)] = 0.985
-    learns: bool = True  # estimate stature and arm lengths from the motion where the profile does not state them
+    learns: bool = True  # stature, arm lengths and how controllers sit, from the motion, where the profile is silent
 
 
 class SolverSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
