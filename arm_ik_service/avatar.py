@@ -6,6 +6,7 @@ disk: the same frames with the same receive times give the same bytes, live or r
 
 from __future__ import annotations
 
+import math
 import struct
 from collections.abc import Sequence
 from typing import Any
@@ -14,7 +15,9 @@ import numpy as np
 
 from arm_ik_service.arm.model import ArmModel
 from arm_ik_service.body.grip import learn_grip
+from arm_ik_service.body.learning import resume_learning
 from arm_ik_service.body.profile import BodyMeasures, Profile
+from arm_ik_service.body.shoulders import STERNOCLAVICULAR
 from arm_ik_service.body.state import BODY
 from arm_ik_service.body.step import initialise_body, step_body
 from arm_ik_service.compiled import compiled, record_dtype
@@ -135,8 +138,8 @@ class Avatars:
     def resume(self, index: int, state: ArmsState) -> bool:
         """Let the person in row `index`, at rest until now, go on from an answer that another process published.
 
-        The elbows stay where they were and the chest looks where it looked. An answer with a number that no arm has is
-        not used: returns whether it was.
+        The elbows stay where they were, and lengths that were being learnt go on from what they were. An answer with a
+        number that no arm has is not used: returns whether it was.
         """
         row = self._rows[index]
         configurations = [np.array(arm.configuration, np.float64) for arm in (state.left, state.right)]
@@ -149,6 +152,13 @@ class Avatars:
             arm["configuration"] = q
             arm["before"] = q
             arm["started"] = 1  # not a first frame: it would choose the elbow afresh
+        left, right = state.left.bones, state.right.bones
+        resume_learning(
+            row.body,
+            math.dist(right.upper_arm.position, right.forearm.position),
+            math.dist(right.forearm.position, right.hand.position),
+            0.5 * math.dist(left.clavicle.position, right.clavicle.position) / STERNOCLAVICULAR[0],
+        )
         return True
 
     def measures(self, index: int, profile: Profile) -> BodyMeasures:

@@ -6,6 +6,7 @@ the difference of the sample times. So frames that share a time stamp, or nearly
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -111,7 +112,9 @@ class Published:
 
 def publish(take: Take, profile: Profile, settings: Settings | None = None) -> Published:
     """Send a take through all stages."""
-    answers = [state for _, state in solve_frames(_frames_of(take), profile, settings or Settings())]
+    answers = [
+        state for _, state in solve_frames(_frames_of(take), defaultdict(lambda: profile), settings or Settings())
+    ]
     assert len(answers) == len(take.t)
     arms = [(state.left, state.right) for state in answers]
     return Published(

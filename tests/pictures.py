@@ -28,7 +28,7 @@ from arm_ik_service.io.zenoh_bus import BusOptions, open_client
 from arm_ik_service.io.zenoh_streams import declare_stream
 from arm_ik_service.programs.demo import bundled_session, free_endpoint
 from arm_ik_service.programs.elbow_comfort import ElbowComforts
-from arm_ik_service.programs.offline import profile_for, solve_frames
+from arm_ik_service.programs.offline import profiles_for, solve_frames
 from arm_ik_service.settings import Settings
 from arm_ik_service.skeleton import skeleton_of
 from arm_ik_service.skin.load import load_built_in_arms
@@ -94,8 +94,8 @@ def arm_ik(*arguments: str) -> None:
 def solved(name: str, avatar: str, start: int, count: int) -> tuple[Skeleton, list[tuple[RecordedFrame, ArmsState]]]:
     """Frames of a bundled recording with their answers, as somebody else's who begins with frame `start`."""
     session = open_session(bundled_session(name))
-    profile = profile_for(session)
-    answers = islice(solve_frames(session.frames(), profile, Settings()), start, start + count)
+    profiles = profiles_for(session)
+    answers = islice(solve_frames(session.frames(), profiles, Settings()), start, start + count)
     frames = []
     for seq, (recorded, state) in enumerate(answers):
         times = {"seq": seq, "sample_time_ns": round(seq * 1e9 / RATE_HZ)}
@@ -105,7 +105,7 @@ def solved(name: str, avatar: str, start: int, count: int) -> tuple[Skeleton, li
                 msgspec.structs.replace(state, avatar=avatar, **times),
             )
         )
-    return skeleton_of(avatar, profile), frames
+    return skeleton_of(avatar, profiles[session.avatars[0]]), frames
 
 
 def view(folder: Path, work: Path, _avatar: Path | None) -> None:

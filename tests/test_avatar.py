@@ -114,3 +114,49 @@ def test_a_frame_without_any_device_is_answered_with_finite_numbers_and_says_los
     assert state.left.tracking == "lost"
     assert np.isfinite(state.left.configuration).all()
     assert state.left.bones.hand.position[1] > 0.3
+
+
+def test_whoever_is_taken_over_keeps_the_lengths_that_were_learnt_of_them(frames: list[ControllerFrame]) -> None:
+    def tall(pose: TrackedPose | None) -> TrackedPose | None:
+        if pose is None:
+            return None
+        x, y, z = pose.position
+        return msgspec.structs.replace(pose, position=(1.15 * x, 1.15 * y, 1.15 * z))
+
+    seen = [
+        msgspec.structs.replace(frame, head=tall(frame.head), left=tall(frame.left), right=tall(frame.right))
+        for frame in frames
+    ]
+    first, second = Avatars(), Avatars()
+    for avatars in (first, second):
+        avatars.reset(0, Profile())
+    for frame in seen[:-1]:
+        place = first.add(0, frame, frame.sample_time_ns)
+        first.step()
+    last = first.answer(place, seen[-2], "one", 0)
+    assert second.resume(0, last)
+    learnt, average = first.lengths([0]), Avatars()
+    average.reset(0, Profile())
+    assert np.abs(learnt - average.lengths([0])).max() > 0.05
+    np.testing.assert_allclose(second.lengths([0]), learnt, atol=1e-9)
+    for avatars in (first, second):
+        avatars.add(0, seen[-1], seen[-1].sample_time_ns)
+        avatars.step()
+    np.testing.assert_allclose(second.lengths([0]), first.lengths([0]), atol=5e-3)
+
+
+@pytest.mark.parametrize("forearm_m", [float("nan"), 0.0, 7.0])
+def test_lengths_that_no_person_has_are_not_taken_over(frames: list[ControllerFrame], forearm_m: float) -> None:
+    first, second = Avatars(), Avatars()
+    for avatars in (first, second):
+        avatars.reset(0, Profile())
+    first.add(0, frames[0], frames[0].sample_time_ns)
+    first.step()
+    last = first.answer(0, frames[0], "one", 0)
+    bones = last.right.bones
+    x, y, z = bones.forearm.position
+    away = msgspec.structs.replace(bones.hand, position=(x + forearm_m, y, z))
+    arm = msgspec.structs.replace(last.right, bones=msgspec.structs.replace(bones, hand=away))
+    before = second.lengths([0])
+    assert second.resume(0, msgspec.structs.replace(last, right=arm))
+    np.testing.assert_array_equal(second.lengths([0]), before)

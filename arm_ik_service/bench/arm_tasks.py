@@ -22,7 +22,7 @@ from arm_ik_service.errors import SessionError
 from arm_ik_service.geometry import batch
 from arm_ik_service.io.columns import Archive
 from arm_ik_service.io.session import NPZ_MAGIC, open_session
-from arm_ik_service.programs.offline import profile_for, receive_times
+from arm_ik_service.programs.offline import profiles_for, receive_times
 from arm_ik_service.settings import Settings, to_record
 from arm_ik_service.tracking.frame import FRAME, pack_frame
 from arm_ik_service.tracking.state import ACCEPTED, TRACKING
@@ -103,14 +103,14 @@ def _recorded(name: str, archive: Archive, frames: int) -> Iterator[ArmTask]:
 def _asked_for(path: Path, start: int, frames: int) -> list[ArmTask]:
     """Run tracking and body over the session and keep what they ask of the arms."""
     session = open_session(path)
-    profile = profile_for(session)
     settings = Settings()
     packed, tracking, body = np.zeros(1, FRAME), np.zeros(1, TRACKING), np.zeros(1, BODY)
     initialise_tracking(tracking[0])
+    avatar = session.avatars[0]
+    profile = profiles_for(session)[avatar]
     initialise_body(body[0], profile)
     tracking_settings, body_settings = to_record(settings.tracking), to_record(settings.body)
     times_s, targets, shoulders = [], [], []
-    avatar = session.avatars[0]
     stream = receive_times(recorded for recorded in session.frames() if recorded.avatar == avatar)
     for recorded, now_ns in islice(stream, start + frames):
         pack_frame(recorded.frame, packed.view(np.uint8).data)

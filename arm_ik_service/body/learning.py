@@ -55,6 +55,26 @@ def initialise_learning(body: Record, profile: Profile) -> None:
     body["stature"] = measures.stature_m
 
 
+def resume_learning(body: Record, upper_arm_m: float, forearm_m: float, half_width_m: float) -> None:
+    """Go on from lengths that another process learnt of the person in a BODY record, so far as they are open.
+
+    Lengths that no person has are not taken.
+    """
+    learning = body["learning"]
+    length_m = upper_arm_m + forearm_m
+    if not learning["arms"] or not length_m > 0.0:
+        return
+    stature = half_width_m / HALF_WIDTH_PER_STATURE if learning["width"] and learning["stature"] else body["stature"]
+    eyes, length = EYES_PER_STATURE * stature, length_m / (ARM_PER_STATURE * stature)
+    if not (STANDING_EYES_M[0] <= eyes <= STANDING_EYES_M[1] and LENGTH_RANGE[0] <= length <= LENGTH_RANGE[1]):
+        return
+    learning["watched_s"] = LENGTH_SETTLES_AFTER_S
+    learning["eyes"], learning["length"] = eyes, length
+    body["stature"], body["arm_length"], body["upper_arm"], body["forearm"] = stature, length_m, upper_arm_m, forearm_m
+    if learning["width"]:
+        body["half_width"] = half_width_m
+
+
 @compiled
 def _learn_stature(body: Record, eyes_m: float, elapsed_s: float) -> None:
     learning = body.learning

@@ -44,16 +44,17 @@ def check(
 
     from rich.console import Console as Terminal
 
+    from arm_ik_service.body.profile import Profile
     from arm_ik_service.cli.progress import frames_progress
     from arm_ik_service.io.profile_store import find_profile
     from arm_ik_service.io.session import open_session
     from arm_ik_service.programs.checker import check_avatar
-    from arm_ik_service.programs.offline import profile_for
+    from arm_ik_service.programs.offline import profiles_for
     from arm_ik_service.settings import load_settings
 
     recording = open_session(session)
     used_settings = load_settings(settings)
-    used = profile_for(recording, find_profile(profile) if profile else None)
+    used = profiles_for(recording, find_profile(profile) if profile else None)
     reports = []
     with ExitStack() as stack:
         also: Callable[[RecordedFrame, ArmsState], None] | None = None
@@ -63,14 +64,15 @@ def check(
 
             view = stack.enter_context(RerunView(Save(save), name=session.name))
             for name in recording.avatars:
-                view.describe(skeleton_of(name, used))
+                view.describe(skeleton_of(name, used[name]))
 
             def also(recorded: RecordedFrame, state: ArmsState) -> None:
                 view.add(state, recorded.frame)
 
         for name in [avatar] if avatar is not None else recording.avatars:
             with frames_progress(f"{session.name}: {name}", recording.frame_count) as progress:
-                reports.append(check_avatar(recording, name, used, used_settings, progress=progress, also=also))
+                person = used.get(name, Profile())
+                reports.append(check_avatar(recording, name, person, used_settings, progress=progress, also=also))
     if json_output:
         report = {"session": str(session), "avatars": [asdict(one) for one in reports], "warnings": recording.warnings}
         typer.echo(json.dumps(report))

@@ -68,9 +68,9 @@ def _solve(
     import time
 
     from arm_ik_service.cli.progress import frames_progress
-    from arm_ik_service.programs.offline import profile_for, save_solution, solve_frames
+    from arm_ik_service.programs.offline import profiles_for, save_solution, solve_frames
 
-    used = profile_for(recording, profile)
+    used = profiles_for(recording, profile)
     frames = (recorded for recorded in recording.frames() if avatar in (None, recorded.avatar))
     began_s = time.perf_counter()
     with frames_progress(recording.path.name, recording.frame_count) as progress:

@@ -46,7 +46,7 @@ def check_avatar(
     times_ns = np.array([time_ns for _, time_ns in timed], np.int64)
     columns: dict[Side, list[tuple[Any, ...]]] = {side: [] for side in SIDES}
     times_s = []
-    for recorded, state in solve_frames((recorded for recorded, _ in timed), profile, settings, progress):
+    for recorded, state in solve_frames((recorded for recorded, _ in timed), {avatar: profile}, settings, progress):
         times_s.append(state.sample_time_ns * 1e-9)
         for side, arm in zip(SIDES, (state.left, state.right), strict=True):
             mask = sum(1 << LIMITS.index(name) for name in arm.limits)

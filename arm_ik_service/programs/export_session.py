@@ -15,7 +15,7 @@ from arm_ik_service.exports.extras import optional_libraries
 from arm_ik_service.exports.mcap_files import WRITERS, StateWriter
 from arm_ik_service.exports.mirror import mirrored
 from arm_ik_service.io.session import Session
-from arm_ik_service.programs.offline import profile_for, solve_frames
+from arm_ik_service.programs.offline import profiles_for, solve_frames
 from arm_ik_service.settings import Settings
 from arm_ik_service.wire.messages import ArmsState
 
@@ -99,7 +99,7 @@ def _states(
     solve = profile is not None or settings is not None or next(session.arms(), None) is None
     if solve:
         frames = (recorded for recorded in session.frames() if avatar in (None, recorded.avatar))
-        used = profile_for(session, profile)
+        used = profiles_for(session, profile)
         for _, state in solve_frames(frames, used, settings or Settings(), progress):
             yield state
         return

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from itertools import islice
 from pathlib import Path
 
@@ -25,17 +25,15 @@ PAUSE_NS = 1_000_000_000  # stands for the pause that a clock stepping back with
 Progress = Callable[[int], None]
 
 
-def profile_in(session: Session) -> Profile | None:
-    """Return the profile that a recorded service used in the end, if the recording holds one."""
-    for avatar in session.avatars:
-        if logged := session.calibrations(avatar):
-            return msgspec.json.decode(logged[-1].json, type=Profile)
-    return None
+def profile_in(session: Session, avatar: str) -> Profile | None:
+    """Return the profile that a recorded service used in the end for an avatar, if the recording holds one."""
+    logged = session.calibrations(avatar)
+    return msgspec.json.decode(logged[-1].json, type=Profile) if logged else None
 
 
-def profile_for(session: Session, stated: Profile | None = None) -> Profile:
-    """Return the profile to solve a recording with: the stated one, the recorded one, or an average person's."""
-    return stated or profile_in(session) or Profile()
+def profiles_for(session: Session, stated: Profile | None = None) -> dict[str, Profile]:
+    """Return what each avatar is to be solved with: the stated profile, their recorded one, or an average person's."""
+    return {avatar: stated or profile_in(session, avatar) or Profile() for avatar in session.avatars}
 
 
 def receive_times(frames: Iterator[RecordedFrame]) -> Iterator[tuple[RecordedFrame, int]]:
@@ -57,9 +55,15 @@ def receive_times(frames: Iterator[RecordedFrame]) -> Iterator[tuple[RecordedFra
 
 
 def solve_frames(
-    frames: Iterator[RecordedFrame], profile: Profile, settings: Settings, progress: Progress | None = None
+    frames: Iterator[RecordedFrame],
+    profiles: Mapping[str, Profile],
+    settings: Settings,
+    progress: Progress | None = None,
 ) -> Iterator[tuple[RecordedFrame, ArmsState]]:
-    """Solve frames in order; yields each accepted frame with its answer. `progress` is told how many were read."""
+    """Solve frames in order, each avatar with its profile; yields each accepted frame with its answer.
+
+    `progress` is told how many were read.
+    """
     avatars: dict[str, int] = {}
     table = Avatars(settings, capacity=1, batch=BATCH)
     stream = receive_times(frames)
@@ -69,7 +73,7 @@ def solve_frames(
             if index is None:
                 index = avatars[recorded.avatar] = len(avatars)
                 table.reserve(len(avatars))
-                table.reset(index, profile)
+                table.reset(index, profiles[recorded.avatar])
             table.add(index, recorded.frame, now_ns)
         table.step()
         for place, (recorded, now_ns) in enumerate(block):
@@ -83,7 +87,7 @@ def save_solution(
     output: Path,
     session: Session,
     answers: Iterator[tuple[RecordedFrame, ArmsState]],
-    profile: Profile,
+    profiles: Mapping[str, Profile],
     avatar: str | None = None,
 ) -> int:
     """Write answers as arrays (`.npz`) or as a recording (`.mcap`); returns how many. Raises SessionError."""
@@ -94,7 +98,9 @@ def save_solution(
             for recorded, answer in answers:
                 if recorded.avatar not in described:
                     described.add(recorded.avatar)
-                    writer.write_calibration(recorded.avatar, encode(profile, "json"), answer.receive_time_ns)
+                    writer.write_calibration(
+                        recorded.avatar, encode(profiles[recorded.avatar], "json"), answer.receive_time_ns
+                    )
                 writer.write_frame(recorded.avatar, recorded.frame, answer.receive_time_ns)
                 writer.write_arms(recorded.avatar, answer, answer.receive_time_ns)
                 count += 1
@@ -102,6 +108,7 @@ def save_solution(
     if avatar is None and len(session.avatars) > 1:
         names = ", ".join(session.avatars)
         raise SessionError(f"{session.path} holds {names}; arrays are of one person: choose with --avatar")
+    profile = profiles[avatar or session.avatars[0]]
     arrays = SolutionWriter(profile.grip.left.position_m, profile.grip.right.position_m)
     for _, answer in answers:
         arrays.write(answer)

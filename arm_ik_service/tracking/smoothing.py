@@ -43,8 +43,10 @@ def _adaptive_gain(channel: Record, filters: Any, level: int, away: float, dt_s:
         return 1.0
     gain = _gain(rest_hz + rise * max(g.norm(slope) - threshold, 0.0), dt_s)
     gain = max(gain, min(2.0 - channel.restarted_s / STARTS_FOR_S, 1.0))
-    left = (1.0 - gain) * away / leash
-    return float(1.0 - (1.0 - gain) / (1.0 + left**8) ** 0.125)
+    squared = ((1.0 - gain) * away / leash) ** 2
+    eighth = squared * squared * squared * squared
+    leashed = math.sqrt(math.sqrt(math.sqrt(1.0 + eighth)))  # no kink where the leash is taut
+    return float(1.0 - (1.0 - gain) / leashed)
 
 
 @compiled

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from itertools import islice
 
 import numpy as np
@@ -64,7 +65,7 @@ def test_the_postures_of_these_tests_are_those_of_the_arm_model() -> None:
 
 def test_a_solved_persons_bones_point_where_their_rotations_since_the_t_pose_say() -> None:
     frames = islice(open_session(bundled_session("boxing")).frames(), 0, 900, 30)
-    for _, state in solve_frames(frames, Profile(), Settings()):
+    for _, state in solve_frames(frames, defaultdict(Profile), Settings()):
         for side, arm in posture_of(state).arms():
             outwards = 1.0 if side == "right" else -1.0
             for joint, following in (

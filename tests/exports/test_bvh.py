@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -72,7 +73,7 @@ def test_positions_read_back_are_the_published_ones(tmp_path: Path) -> None:
 
 def test_measures_that_are_learned_on_the_way_and_shoulders_that_slide_are_followed(tmp_path: Path) -> None:
     session = open_session(bundled_session("boxing"))  # nobody calibrated: arms grow by centimetres
-    states = [state for _, state in solve_frames(islice(session.frames(), 400), Profile(), Settings())]
+    states = [state for _, state in solve_frames(islice(session.frames(), 400), defaultdict(Profile), Settings())]
     path = write(tmp_path / "learned.bvh", states)
     assert bvhio.readAsBvh(str(path), loadKeyFrames=False).FrameCount == len(states)
     root = bvhio.readAsHierarchy(str(path))

@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 import tracemalloc
+from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -161,7 +162,9 @@ def test_memory_does_not_grow_with_the_session(tmp_path: Path, suffix: str, shor
 
 def long_session(path: Path, seconds: float, *, answers: bool) -> int:
     """Loop the bundled recording for so long; returns the number of frames."""
-    once = list(solve_frames(open_session(bundled_session("reach_and_grab")).frames(), Profile(), Settings()))
+    once = list(
+        solve_frames(open_session(bundled_session("reach_and_grab")).frames(), defaultdict(Profile), Settings())
+    )
     period_ns = once[-1][0].frame.sample_time_ns - once[0][0].frame.sample_time_ns + 13_888_889
     count = 0
     with RecordingWriter(path) as writer:

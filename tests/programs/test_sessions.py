@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import json
+import math
 import signal
 import subprocess
 import time
@@ -13,11 +15,13 @@ import numpy as np
 import pytest
 from harness import COMMAND, KEYS, Running, Service, wait_for
 
+from arm_ik_service.body.profile import BodyMeasures, Profile
 from arm_ik_service.io.recording import RecordingWriter, open_recording
 from arm_ik_service.io.session import open_session
 from arm_ik_service.io.zenoh_bus import BusOptions, open_client
 from arm_ik_service.io.zenoh_streams import put_once, subscribe
 from arm_ik_service.programs.demo import bundled_session, free_endpoint
+from arm_ik_service.programs.offline import profiles_for
 from arm_ik_service.programs.replayer import ReplayOptions, selected
 
 FAST = ["--speed", "6"]  # what the tests need is the frames, not the minutes
@@ -193,3 +197,24 @@ def test_the_demo_ends_with_its_summary(tmp_path: Path, recording: Path) -> None
     for word in ("frames answered", "rate", "latency", "residual", "iterations", "joint limits"):
         assert word in result.stdout
     assert picture.stat().st_size > 100_000
+
+
+def test_everybody_in_a_recording_is_solved_with_their_own_measures(recording: Path, tmp_path: Path) -> None:
+    statures = {"ann": 1.5, "bob": 1.9}
+    together, solved = tmp_path / "together.mcap", tmp_path / "solved.mcap"
+    with RecordingWriter(together) as writer:
+        for name, stature in statures.items():
+            profile = Profile(body=BodyMeasures(stature_m=stature))
+            writer.write_calibration(name, msgspec.json.encode(profile), 0)
+        for recorded in itertools.islice(open_session(recording).frames(), 20):
+            for name in (*statures, "eve"):
+                writer.write_frame(name, recorded.frame, recorded.receive_time_ns or 0)
+    assert arm_ik("solve", str(together), "-o", str(solved)).returncode == 0
+    session = open_session(solved)
+    used = {name: profile.body.stature_m for name, profile in profiles_for(session).items()}
+    assert used == statures | {"eve": Profile().body.stature_m}
+    forearms = {
+        state.avatar: math.dist(state.left.bones.forearm.position, state.left.bones.hand.position)
+        for state in session.arms()
+    }
+    assert forearms["ann"] < forearms["eve"] < forearms["bob"]
