@@ -41,8 +41,8 @@ def initialise_grip(grip: Record, profile: Profile) -> None:
 
 @compiled
 def mirrored_turn(turn: Vector, k: int) -> Vector:
-    """A rotation vector of the right hand (1) or the left (0) as that of the right hand, and back."""
-    return turn if k == 1 else (turn[0], -turn[1], -turn[2])
+    """A rotation vector, which is axial, of the right hand (1) or the left (0) as that of the right hand, and back."""
+    return turn if k == 1 else g.scale(-1.0, g.mirror_vector(turn))
 
 
 @compiled

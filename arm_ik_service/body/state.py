@@ -29,7 +29,8 @@ BODY = record_dtype(
         ("upper_arm", np.float64),
         ("forearm", np.float64),
         ("half_width", np.float64),  # of the shoulders
-        ("grip_from_wrist", POSE, (2,)),  # as the profile has it
+        ("wrist_in_grip", np.float64, (2, 4)),  # rotation of the wrist in the grip's frame, as the profile has it
+        ("grip_in_wrist", np.float64, (2, 3)),  # place of the grip in the wrist's frame, as the profile has it [m]
         # the answer, in world axes; left, right
         ("head_position", np.float64, (3,)),
         ("head_rotation", np.float64, (4,)),

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from arm_ik_service.body.chest import step_chest
 from arm_ik_service.body.grip import initialise_grip, mirrored_turn
 from arm_ik_service.body.learning import initialise_learning, learn
-from arm_ik_service.body.profile import GripOffset, Profile
+from arm_ik_service.body.profile import Profile
 from arm_ik_service.body.reach import soft_reach
 from arm_ik_service.body.shoulders import settle, step_shoulder
 from arm_ik_service.body.state import BODY
@@ -17,11 +16,6 @@ from arm_ik_service.geometry import batch
 from arm_ik_service.geometry import scalar as g
 
 LONGEST_STEP_S = 0.1  # a gap in the data is not time in which the body was seen to move
-
-
-def _inverse_offset(offset: GripOffset) -> npt.NDArray[np.float64]:
-    rotation = batch.normalized(offset.orientation_xyzw)
-    return batch.inverse(np.concatenate([offset.position_m, rotation]))
 
 
 def initialise_body(body: Record, profile: Profile) -> None:
@@ -34,8 +28,8 @@ def initialise_body(body: Record, profile: Profile) -> None:
     initialise_learning(body, profile)
     initialise_grip(body.grip, profile)
     for k, offset in enumerate((profile.grip.left, profile.grip.right)):
-        pose = _inverse_offset(offset)
-        body.grip_from_wrist[k].position[:], body.grip_from_wrist[k].rotation[:] = pose[:3], pose[3:]
+        body.wrist_in_grip[k] = batch.conjugate(batch.normalized(offset.orientation_xyzw))
+        body.grip_in_wrist[k] = offset.position_m
     for q in (body.head_rotation, body.chest_rotation):
         q[:] = g.IDENTITY
     for k in range(2):
@@ -45,14 +39,12 @@ def initialise_body(body: Record, profile: Profile) -> None:
 
 @compiled
 def _place_wrist(body: Record, tracking: Record, k: int) -> None:
-    hand, grip_from_wrist = tracking.hands[k], body.grip_from_wrist[k]
-    world_from_grip = g.quaternion(hand.rotation)
-    assumed = g.multiply(world_from_grip, g.quaternion(grip_from_wrist.rotation))
+    hand = tracking.hands[k]
+    assumed = g.multiply(g.quaternion(hand.rotation), g.quaternion(body.wrist_in_grip[k]))
     rotation = g.multiply(assumed, g.exp(mirrored_turn(g.vector(body.grip.turn), k)))
     # the grip stays where it is in the hand, however that is turned
-    in_wrist = g.rotate(g.conjugate(g.quaternion(grip_from_wrist.rotation)), g.vector(grip_from_wrist.position))
-    offset = g.rotate(rotation, in_wrist)
-    g.store(body.wrists[k].position, g.add(g.vector(hand.position), offset))
+    offset = g.rotate(rotation, g.vector(body.grip_in_wrist[k]))
+    g.store(body.wrists[k].position, g.subtract(g.vector(hand.position), offset))
     g.store(body.wrists[k].rotation, g.normalized(rotation))
 
 

@@ -44,7 +44,6 @@ def check(
 
     from rich.console import Console as Terminal
 
-    from arm_ik_service.body.profile import Profile
     from arm_ik_service.cli.progress import frames_progress
     from arm_ik_service.io.profile_store import find_profile
     from arm_ik_service.io.session import open_session
@@ -71,8 +70,7 @@ def check(
 
         for name in [avatar] if avatar is not None else recording.avatars:
             with frames_progress(f"{session.name}: {name}", recording.frame_count) as progress:
-                person = used.get(name, Profile())
-                reports.append(check_avatar(recording, name, person, used_settings, progress=progress, also=also))
+                reports.append(check_avatar(recording, name, used, used_settings, progress=progress, also=also))
     if json_output:
         report = {"session": str(session), "avatars": [asdict(one) for one in reports], "warnings": recording.warnings}
         typer.echo(json.dumps(report))

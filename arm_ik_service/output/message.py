@@ -14,7 +14,7 @@ import msgspec
 import numpy as np
 
 from arm_ik_service.arm.model import LIMITS
-from arm_ik_service.compiled import compiled
+from arm_ik_service.compiled import compiled, inlined
 from arm_ik_service.output.record import OUTPUT
 from arm_ik_service.wire import codec
 from arm_ik_service.wire.messages import (
@@ -177,15 +177,13 @@ def write_body(numbers: Any, literals: Any, steps: Any, out: Any) -> int:
             continue
         end = at + np.uint64(steps[n, 2])
         for word in range(steps[n, 0], steps[n, 1]):
-            for i in range(8):  # one instruction, as is the number's loop below
+            for i in range(8):  # one instruction, as is the loop of a float
                 out[at + np.uint64(i)] = literals[word] >> 8 * i & 0xFF
             at += np.uint64(8)
         at = end
         if kind == FLOAT:
             out[at] = 0xCB
-            for i in range(8):
-                out[at + np.uint64(1 + i)] = number >> 8 * (7 - i) & 0xFF
-            at += np.uint64(9)
+            at = _write_number(out, at + np.uint64(1), number, 8)
         elif kind == COUNT:
             at = _write_count(out, at, number)
         elif kind == SIZE_OF_MASK:
@@ -197,6 +195,14 @@ def write_body(numbers: Any, literals: Any, steps: Any, out: Any) -> int:
     return int(at)
 
 
+@inlined
+def _write_number(out: Any, at: Any, number: int, size: int) -> Any:
+    """Write the last `size` bytes of a whole number, the highest first; return where they end."""
+    for i in range(size):
+        out[at + np.uint64(i)] = number >> 8 * (size - 1 - i) & 0xFF
+    return at + np.uint64(size)
+
+
 @compiled
 def _write_count(out: Any, at: Any, number: int) -> Any:
     """Write a whole number in the shortest of its forms, as msgspec does; return where it ends."""
@@ -205,9 +211,7 @@ def _write_count(out: Any, at: Any, number: int) -> Any:
         size, head = (1, 0xCC) if number < 0x100 else (2, 0xCD) if number < 0x10000 else (4, 0xCE)
         out[at] = head
         at += np.uint64(1)
-    for i in range(size):
-        out[at + np.uint64(i)] = number >> 8 * (size - 1 - i) & 0xFF
-    return at + np.uint64(size)
+    return _write_number(out, at, number, size)
 
 
 def read_output(output: np.ndarray[Any, Any], header: ArmsHeader) -> ArmsState:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,7 +14,7 @@ from arm_ik_service.body.report import ArmReport, report_arm
 from arm_ik_service.errors import SessionError
 from arm_ik_service.io.session import RecordedFrame, Session
 from arm_ik_service.programs.calibrator import as_records
-from arm_ik_service.programs.offline import receive_times, solve_frames
+from arm_ik_service.programs.offline import receive_times, require_avatar, solve_frames
 from arm_ik_service.settings import Settings
 from arm_ik_service.tracking.report import SessionReport, report_session
 from arm_ik_service.wire.messages import SIDES, ArmsState, Side
@@ -32,13 +32,14 @@ class PersonReport:
 def check_avatar(
     session: Session,
     avatar: str,
-    profile: Profile,
+    profiles: Mapping[str, Profile],
     settings: Settings,
     *,
     progress: Callable[[int], None] | None = None,
     also: Callable[[RecordedFrame, ArmsState], None] | None = None,
 ) -> PersonReport:
     """Report on one avatar's frames; `also` is given every answer. Raises SessionError where there are none."""
+    require_avatar(session, avatar)
     timed = list(receive_times(recorded for recorded in session.frames() if recorded.avatar == avatar))
     if not timed:
         raise SessionError(f"{session.path}: no frame of {avatar!r} in it; it has {', '.join(session.avatars)}")
@@ -46,7 +47,7 @@ def check_avatar(
     times_ns = np.array([time_ns for _, time_ns in timed], np.int64)
     columns: dict[Side, list[tuple[Any, ...]]] = {side: [] for side in SIDES}
     times_s = []
-    for recorded, state in solve_frames((recorded for recorded, _ in timed), {avatar: profile}, settings, progress):
+    for recorded, state in solve_frames((recorded for recorded, _ in timed), profiles, settings, progress):
         times_s.append(state.sample_time_ns * 1e-9)
         for side, arm in zip(SIDES, (state.left, state.right), strict=True):
             mask = sum(1 << LIMITS.index(name) for name in arm.limits)

@@ -15,7 +15,7 @@ from arm_ik_service.exports.extras import optional_libraries
 from arm_ik_service.exports.mcap_files import WRITERS, StateWriter
 from arm_ik_service.exports.mirror import mirrored
 from arm_ik_service.io.session import Session
-from arm_ik_service.programs.offline import profiles_for, solve_frames
+from arm_ik_service.programs.offline import profiles_for, require_avatar, solve_frames
 from arm_ik_service.settings import Settings
 from arm_ik_service.wire.messages import ArmsState
 
@@ -46,8 +46,7 @@ def export_session(
 
     The file appears whole or not at all. Raises SessionError or SettingsError for what cannot be done.
     """
-    if avatar is not None and avatar not in session.avatars:
-        raise SessionError(f"{session.path}: no avatar {avatar!r}; it has {', '.join(session.avatars)}")
+    require_avatar(session, avatar)
     if output.suffix == ".bvh" and avatar is None and len(session.avatars) > 1:
         names = ", ".join(session.avatars)
         raise SessionError(f"{session.path} holds {names}; .bvh holds one person: choose with --avatar")

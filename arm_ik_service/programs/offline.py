@@ -36,6 +36,12 @@ def profiles_for(session: Session, stated: Profile | None = None) -> dict[str, P
     return {avatar: stated or profile_in(session, avatar) or Profile() for avatar in session.avatars}
 
 
+def require_avatar(session: Session, avatar: str | None) -> None:
+    """Raise SessionError where a session has no frame of an avatar that is asked for; None asks for everybody."""
+    if avatar is not None and avatar not in session.avatars:
+        raise SessionError(f"{session.path}: no avatar {avatar!r}; it has {', '.join(session.avatars)}")
+
+
 def receive_times(frames: Iterator[RecordedFrame]) -> Iterator[tuple[RecordedFrame, int]]:
     """Give every frame a receive time: its own, or the sample time of a file that has none.
 
@@ -91,6 +97,7 @@ def save_solution(
     avatar: str | None = None,
 ) -> int:
     """Write answers as arrays (`.npz`) or as a recording (`.mcap`); returns how many. Raises SessionError."""
+    require_avatar(session, avatar)
     count = 0
     if output.suffix == ".mcap":
         described: set[str] = set()
@@ -108,7 +115,7 @@ def save_solution(
     if avatar is None and len(session.avatars) > 1:
         names = ", ".join(session.avatars)
         raise SessionError(f"{session.path} holds {names}; arrays are of one person: choose with --avatar")
-    profile = profiles[avatar or session.avatars[0]]
+    profile = profiles[avatar] if avatar is not None else next(iter(profiles.values()), Profile())
     arrays = SolutionWriter(profile.grip.left.position_m, profile.grip.right.position_m)
     for _, answer in answers:
         arrays.write(answer)

@@ -218,3 +218,11 @@ def test_everybody_in_a_recording_is_solved_with_their_own_measures(recording: P
         for state in session.arms()
     }
     assert forearms["ann"] < forearms["eve"] < forearms["bob"]
+
+
+@pytest.mark.parametrize("name", ["arms.npz", "arms.mcap"])
+def test_somebody_who_is_not_in_a_recording_is_refused_in_one_line(recording: Path, tmp_path: Path, name: str) -> None:
+    refused = arm_ik("solve", str(recording), "--avatar", "nobody", "-o", str(tmp_path / name))
+    assert refused.returncode == 2
+    assert "no avatar 'nobody'; it has demo" in refused.stderr
+    assert not list(tmp_path.iterdir())
