@@ -28,10 +28,12 @@ KEEP_ALIVES_PER_LEASE = 4
 _PEERS_MS = 300
 _RETRY = {"period_init_ms": 200, "period_max_ms": 1000, "period_increase_factor": 1.5}
 
-# What may wait on a client's side for the network. Systems let 4 MB wait, which are old poses in front of the door
-# where the newest wins: under overload a third of a second of them, measured. What finds no room the client drops.
-# A hub's receive buffer is left alone: one so small makes TCP drop segments, and wait for a second to send them again.
-WAITING_BYTES = 32 * 1024
+# What may wait for the network: at a client to be sent, at a hub to be read. Systems let 4 MB wait and more, which are
+# old poses in front of the door where the newest wins: under overload a third of a second of them, measured. What finds
+# no room the client drops. Both in two pieces of the largest that TCP sends at once (64 KB within a machine): where one
+# fills the sender's part, it waits 40 ms for an acknowledgement that the receiver keeps back for the second; where one
+# does not fit the receiver's, TCP drops it, and waits 200 ms and more to send it again.
+WAITING_BYTES = 128 * 1024
 
 # To close a link that was cut, with data under way, blocks one of Zenoh's receiving threads for up to 10 s (SO_LINGER,
 # eclipse-zenoh/zenoh#1101). Of the default two, one link to each of two lost machines would take both.
@@ -98,9 +100,9 @@ def _configuration(options: BusOptions, role: Role) -> zenoh.Config:
         put("transport/link/tx/keep_alive", KEEP_ALIVES_PER_LEASE)
     if options.tls is not None:
         _put_tls(options.tls, put)
-    if options.config_file is None and role == "client":
+    if options.config_file is None:
         for protocol in ("tcp", "tls"):
-            put(f"transport/link/{protocol}/so_sndbuf", WAITING_BYTES)
+            put(f"transport/link/{protocol}/{'so_sndbuf' if role == 'client' else 'so_rcvbuf'}", WAITING_BYTES)
     if options.access_file is not None:
         try:
             put("access_control", json.loads(options.access_file.read_bytes()))

@@ -95,7 +95,7 @@ class Inbox:
         self._ready: SimpleQueue[str | None] = SimpleQueue()
         self._next: str | None = _WAKE
         self._doors: dict[str, _Door] = {}  # by key
-        self._owned: dict[str, bool] = {}  # by avatar
+        self._owned: dict[str, bool] = {}  # by key
         self._refused: dict[str, tuple[int, str]] = {}
         self._others = _Others()
         self._own_subscribers: dict[str, zenoh.Subscriber[None]] = {}  # by key
@@ -172,18 +172,17 @@ class Inbox:
         key = str(sample.key_expr)
         if key in self._own_subscribers:
             return  # it comes that way
-        avatar = self._keys.avatar_of(key)
-        owned = self._owned.get(avatar)
+        owned = self._owned.get(key)
         if owned is None:
-            owned = self._is_ours(avatar)
+            owned = self._is_ours(self._keys.avatar_of(key))
             if len(self._owned) >= _FOREIGN_PER_OWN * self._limits.max_avatars:
                 self._owned = {}
-            self._owned[avatar] = owned
+            self._owned[key] = owned
         if owned:
-            self._receive(sample)
+            self._take_in(key, sample)
         elif len(self._others.heard_ns) < _FOREIGN_PER_OWN * self._limits.max_avatars:
             with self._lock:
-                self._others.heard_ns[avatar] = time.monotonic_ns()
+                self._others.heard_ns[self._keys.avatar_of(key)] = time.monotonic_ns()
 
     def _is_ours(self, avatar: str) -> bool:
         try:
@@ -193,14 +192,16 @@ class Inbox:
         return self._owns(avatar)
 
     def _receive(self, sample: zenoh.Sample) -> None:
+        self._take_in(str(sample.key_expr), sample)
+
+    def _take_in(self, key: str, sample: zenoh.Sample) -> None:
         keep_thread_state()
         receive_time_ns = time.time_ns()
-        key = str(sample.key_expr)
         door = self._doors.get(key) or self._admit(key)
         if door is None:
             return
         now_ns = door.last_ns = time.monotonic_ns()
-        due_ns = max(door.due_ns, now_ns) + self._period_ns
+        due_ns = (door.due_ns if door.due_ns > now_ns else now_ns) + self._period_ns
         if due_ns - now_ns > self._burst_ns:
             self._refuse("rate", f"{door.avatar}: more than {self._limits.max_frames_per_s:g} frames a second", door)
             return
