@@ -28,12 +28,14 @@ KEEP_ALIVES_PER_LEASE = 4
 _PEERS_MS = 300
 _RETRY = {"period_init_ms": 200, "period_max_ms": 1000, "period_increase_factor": 1.5}
 
-# What may wait for the network: at a client to be sent, at a hub to be read. Systems let 4 MB wait and more, which are
-# old poses in front of the door where the newest wins: under overload a third of a second of them, measured. What finds
-# no room the client drops. Both in two pieces of the largest that TCP sends at once (64 KB within a machine): where one
-# fills the sender's part, it waits 40 ms for an acknowledgement that the receiver keeps back for the second; where one
-# does not fit the receiver's, TCP drops it, and waits 200 ms and more to send it again.
-WAITING_BYTES = 128 * 1024
+# What may wait for the network: at a client one of Zenoh's batches and what TCP takes to be sent, at a hub what TCP has
+# taken in. Systems let 4 MB wait and more, which are old poses in front of the door where the newest wins: under
+# overload a third of a second of them, measured. What finds no room the client drops. TCP sends up to 64 KB in a piece
+# within a machine: where less than one may wait to be sent, it waits 40 ms for an acknowledgement that the receiver
+# keeps back for the next; where less than two may wait to be read, it drops one, and waits 200 ms to send it again.
+BATCHES_WAITING = 1
+SENT_BYTES = 64 * 1024
+READ_BYTES = 128 * 1024
 
 # To close a link that was cut, with data under way, blocks one of Zenoh's receiving threads for up to 10 s (SO_LINGER,
 # eclipse-zenoh/zenoh#1101). Of the default two, one link to each of two lost machines would take both.
@@ -101,8 +103,7 @@ def _configuration(options: BusOptions, role: Role) -> zenoh.Config:
     if options.tls is not None:
         _put_tls(options.tls, put)
     if options.config_file is None:
-        for protocol in ("tcp", "tls"):
-            put(f"transport/link/{protocol}/{'so_sndbuf' if role == 'client' else 'so_rcvbuf'}", WAITING_BYTES)
+        _bound_what_waits(role, put)
     if options.access_file is not None:
         try:
             put("access_control", json.loads(options.access_file.read_bytes()))
@@ -120,6 +121,14 @@ def _configuration(options: BusOptions, role: Role) -> zenoh.Config:
     except zenoh.ZError as error:
         raise BusError(f"endpoint {', '.join((*listen, *connect))} is not of the form tcp/HOST:PORT") from error
     return config
+
+
+def _bound_what_waits(role: Role, put: Callable[[str, Any], None]) -> None:
+    name, size = ("so_sndbuf", SENT_BYTES) if role == "client" else ("so_rcvbuf", READ_BYTES)
+    for protocol in ("tcp", "tls"):
+        put(f"transport/link/{protocol}/{name}", size)
+    if role == "client":
+        put("transport/link/tx/queue/size/data", BATCHES_WAITING)
 
 
 def _put_tls(files: TlsFiles, put: Callable[[str, Any], None]) -> None:
