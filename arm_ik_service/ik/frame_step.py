@@ -11,6 +11,8 @@
    bounded speed, over as many frames as it takes, and the hand keeps its position on the way.
 6. Whatever came of it, the elbow moves no further than the hand does and ELBOW_STEP_M more, as long as the hand can
    keep its position: its rotation follows a few frames later.
+7. A hand that could not be where it was asked to be comes back at a bounded speed, or at that which is asked of it:
+   along the straight way where the limits allow it, else along that of the joints.
 """
 
 from __future__ import annotations
@@ -19,10 +21,10 @@ import math
 
 from arm_ik_service.arm import tangent
 from arm_ik_service.arm.chain import Columns, columns_of, wrist_at
-from arm_ik_service.arm.configuration import integrate, read_configuration, store_configuration
+from arm_ik_service.arm.configuration import difference, integrate, read_configuration, store_configuration
 from arm_ik_service.arm.tangent import Tangent
 from arm_ik_service.compiled import Record, compiled, inlined
-from arm_ik_service.geometry.scalar import Vector, clip, components, norm, scale, subtract, wrap
+from arm_ik_service.geometry.scalar import Vector, add, clip, components, norm, scale, store, subtract, vector, wrap
 from arm_ik_service.geometry.trigonometry import angle_of
 from arm_ik_service.ik.clock import monotonic_ns
 from arm_ik_service.ik.comfort import discomfort, learn_habit
@@ -50,8 +52,10 @@ STUCK_M = 5e-3  # a position missed by more than this is worth a jump of the elb
 STUCK_RAD = 0.26  # a hand turned further off than this (15 degrees) is worth the elbow's way to another swivel
 ESCAPE_HASTE = 2.0  # times swivel_speed_rad_s on that way
 ELBOW_STEP_M = 0.04  # [m] of the elbow in one frame beyond what the hand moves, whatever the frame rate
+CATCH_UP_M_S = 10.0  # speed of a hand on the way back to where it is asked to be, unless it is asked to move faster
 POSITION_ALONE = 1e-4  # share of the rotation's weight on that way
 POSITION_FIRST = 0.01  # share of the rotation's weight that is left once the target is known to be out of reach
+PARTS = 4  # tries to find how much of a motion moves the hand as far as it may
 _NEARNESS = 0.02  # [1/rad] what a far swivel must gain to be preferred to a near one
 _POSSIBLE = 1e-3  # [rad^2] sum of squared excesses that axial play and carrying angle can make up for
 _ROOM = 0.1  # [rad] to the limits, wanted of the second other start
@@ -329,6 +333,42 @@ def hold_elbow(arm: Record, settings: Record, position: Vector, rotation: Column
     return False
 
 
+@compiled
+def hold_hand(
+    arm: Record, settings: Record, asked: Vector, position: Vector, rotation: Columns, missed: bool, dt_s: float
+) -> bool:
+    """Step 7: where the hand would leap to its `position`, it goes part of the way. Returns whether it was free to go.
+
+    `missed` tells whether it was elsewhere than asked one frame ago: a hand that follows does not leap.
+    """
+    chain, q, anchor = arm.chain, arm.configuration, arm.anchor
+    if not missed and arm.work.position_error_m <= STUCK_M:
+        return True
+    before = wrist_at(chain, anchor)
+    way = subtract(wrist_at(chain, q), before)
+    way_m = norm(way)
+    allowed_m = max(norm(subtract(asked, vector(arm.asked))), CATCH_UP_M_S * dt_s)
+    if way_m <= allowed_m:
+        return True
+    start = read_configuration(anchor)
+    motion = difference(start, read_configuration(q))
+    nearer = nearest_with_room(chain, add(before, scale(allowed_m / way_m, way)))
+    reach = reach_to(chain, nearer)
+    swivel = elbow_swivel(reach, columns_of((q[0], q[1], q[2], q[3])))
+    arm.work.iterations = reach_with_any_rotation(arm, settings, nearer, rotation, reach, swivel, arm.work.iterations)
+    moved_m, share = norm(subtract(wrist_at(chain, q), before)), 1.0
+    if moved_m > allowed_m + STUCK_M:
+        moved_m = way_m
+        for _ in range(PARTS):
+            if moved_m > allowed_m:
+                share *= allowed_m / moved_m
+                store_configuration(q, integrate(chain, start, tangent.scale(share, motion)))
+                moved_m = norm(subtract(wrist_at(chain, q), before))
+    arm.work.position_error_m = norm(subtract(position, wrist_at(chain, q)))
+    arm.status = NEAREST
+    return False
+
+
 @inlined
 def carry_on(arm: Record, towards_comfort: Tangent, dt_s: float) -> None:
     """Move the elbow towards comfort, and pull the hand on as it was pulled last.
@@ -357,6 +397,7 @@ def step_frame(arm: Record, settings: Record, asked: Vector, rotation: Columns, 
     """Take one frame: position and rotation asked of the hand bone, right arm, ISB axes."""
     position = nearest_with_room(arm.chain, asked)
     reach = reach_to(arm.chain, position)
+    missed = arm.position_error_m > STUCK_M
     for i in range(10):
         arm.anchor[i] = arm.configuration[i]
     if arm.escape != 0.0:
@@ -372,9 +413,11 @@ def step_frame(arm: Record, settings: Record, asked: Vector, rotation: Columns, 
         arm.configuration[4] = min(angle_of(reach[3], reach[4]), arm.chain.upper[0])
         follow_target(arm, settings, position, rotation, reach)
     moved_freely = hold_elbow(arm, settings, position, rotation, reach)
+    moved_freely = hold_hand(arm, settings, asked, position, rotation, missed, dt_s) and moved_freely
     moved_freely = moved_freely and arm.status == SOLVED and arm.work.held == 0 and arm.restarted == 0
     arm.steady, arm.frame_s = arm.steady + 1 if moved_freely else 0, dt_s
     report_error(arm, asked, position)
+    store(arm.asked, asked)
     learn_habit(arm.habit, arm.configuration, dt_s)
 
 
@@ -385,3 +428,4 @@ def first_frame(arm: Record, settings: Record, asked: Vector, rotation: Columns)
     reach = reach_to(arm.chain, nearest_with_room(arm.chain, asked))
     take(arm.chain, posture_at(reach, rotation, most_comfortable(arm, reach, rotation)), arm.configuration)
     find_target(arm, settings, asked, rotation)
+    store(arm.asked, asked)

@@ -28,6 +28,7 @@ ARM = record_dtype(
         ("steady", np.int64),  # frames on end that the hand was met with no limit in the way
         ("escape", np.float64),  # [rad] swivel still to go to where the hand can be met; 0: none
         ("kept", np.float64, (10,)),  # the best so far while another start is tried
+        ("asked", np.float64, (3,)),  # of the hand one frame ago [m], in the arm's axes
         ("anchor", np.float64, (10,)),  # configuration at the beginning of the frame
         # the answer; positions and rotations in the shoulder frame of the arm's own side
         ("configuration", np.float64, (10,)),

@@ -1,4 +1,4 @@
-"""A hand that turns further than any wrist can follow must not throw the elbow about, nor lose its place."""
+"""What no arm can follow must not throw it about: neither hands that turn too far nor hands that are out of reach."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import pytest
 
 from arm_ik_service.arm.model import ArmModel
 from arm_ik_service.geometry import batch
-from arm_ik_service.ik.frame_step import ELBOW_STEP_M, STUCK_M
+from arm_ik_service.ik.frame_step import CATCH_UP_M_S, ELBOW_STEP_M, STUCK_M
 from arm_ik_service.ik.jacobian_transpose import JacobianTranspose
 
 FRAMES, RATE_HZ = 1500, 90.0
@@ -35,6 +35,27 @@ def test_the_elbow_moves_little_more_than_the_hand_and_the_hand_keeps_its_place(
     assert np.max(steps - hand_steps) < ELBOW_STEP_M + CARRY_M
     assert np.percentile(track.position_error_m, 99.0) < STUCK_M
     assert np.max(track.position_error_m) < 0.03
+
+
+def roaming(seed: int) -> batch.Array:
+    """Hands (FRAMES, 7) all around the right shoulder, behind the back and in the hole before it, that turn slowly."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(FRAMES)[:, None] / RATE_HZ
+    waves = [rng.normal(size=3) * np.sin(2 * np.pi * f * t + rng.uniform(0, 6, 3)) for f in (0.2, 0.3, 0.5, 0.6)]
+    return np.concatenate([0.25 * (waves[0] + waves[1]), batch.exp(0.7 * (waves[2] + waves[3]))], axis=1)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_hand_that_was_held_back_comes_back_no_faster_than_it_is_asked_to_move_or_may_catch_up(seed: int) -> None:
+    arm = ArmModel.load(side="right")
+    targets = roaming(seed)
+    track = JacobianTranspose(arm, frame_rate_hz=RATE_HZ).track(targets)
+    steps, asked = (
+        np.linalg.norm(np.diff(hands[:, :3], axis=0), axis=1)
+        for hands in (arm.forward(track.configuration)["hand"], targets)
+    )
+    assert np.mean(track.position_error_m > STUCK_M) > 0.05, "hands are held back in this stream"
+    assert np.max(steps - np.maximum(asked, CATCH_UP_M_S / RATE_HZ)) < STUCK_M
 
 
 def test_the_budget_is_kept_on_the_most_hostile_stream() -> None:
