@@ -21,20 +21,22 @@ import math
 
 from arm_ik_service.arm import tangent
 from arm_ik_service.arm.chain import Columns, columns_of, wrist_at
-from arm_ik_service.arm.configuration import difference, integrate, read_configuration, store_configuration
+from arm_ik_service.arm.configuration import integrate, read_configuration, store_configuration
 from arm_ik_service.arm.tangent import Tangent
 from arm_ik_service.compiled import Record, compiled, inlined
-from arm_ik_service.geometry.scalar import Vector, add, clip, components, norm, scale, store, subtract, vector, wrap
+from arm_ik_service.geometry.scalar import Vector, clip, components, norm, scale, store, subtract
 from arm_ik_service.geometry.trigonometry import angle_of
-from arm_ik_service.ik.clock import monotonic_ns
+from arm_ik_service.ik.any_rotation import POSITION_ALONE, STUCK_M, deadline_of, reach_with_any_rotation
 from arm_ik_service.ik.comfort import discomfort, learn_habit
 from arm_ik_service.ik.conjugate import NEAREST, OUT_OF_TIME, SOLVED, converge
 from arm_ik_service.ik.held import rests, walls_at
 from arm_ik_service.ik.jacobian import NO_WRENCH, read_wrench, store_wrench
+from arm_ik_service.ik.pace import ELBOW_STEP_M, hold_elbow, hold_hand
 from arm_ik_service.ik.swivel import (
     Reach,
     elbow_side,
     elbow_swivel,
+    nearest_with_room,
     posture_at,
     reach_to,
     side_at,
@@ -48,14 +50,9 @@ FLAT = 0.3  # curvature below which discomfort counts as flat: Newton's step wou
 GIVE_TIME_S = 0.3  # in which the carrying angle and the wrist's axial play come back to zero
 HALF_SURE = 1.0  # curvature at which the elbow's confidence is one half
 STEADY = 8  # frames without a limit before a motion is carried on: one that leaves a limit is not the one that came
-STUCK_M = 5e-3  # a position missed by more than this is worth a jump of the elbow
 STUCK_RAD = 0.26  # a hand turned further off than this (15 degrees) is worth the elbow's way to another swivel
 ESCAPE_HASTE = 2.0  # times swivel_speed_rad_s on that way
-ELBOW_STEP_M = 0.04  # [m] of the elbow in one frame beyond what the hand moves, whatever the frame rate
-CATCH_UP_M_S = 10.0  # speed of a hand on the way back to where it is asked to be, unless it is asked to move faster
-POSITION_ALONE = 1e-4  # share of the rotation's weight on that way
 POSITION_FIRST = 0.01  # share of the rotation's weight that is left once the target is known to be out of reach
-PARTS = 4  # tries to find how much of a motion moves the hand as far as it may
 _NEARNESS = 0.02  # [1/rad] what a far swivel must gain to be preferred to a near one
 _POSSIBLE = 1e-3  # [rad^2] sum of squared excesses that axial play and carrying angle can make up for
 _ROOM = 0.1  # [rad] to the limits, wanted of the second other start
@@ -129,23 +126,6 @@ def _converge(
 
 
 @inlined
-def _deadline(settings: Record) -> int:
-    return monotonic_ns() + int(1e3 * settings.time_limit_us) if settings.time_limit_us > 0.0 else 0
-
-
-@inlined
-def nearest_with_room(chain: Record, position: Vector) -> Vector:
-    """Return the wrist position itself, or the nearest that a fully bent elbow leaves room for.
-
-    In the hole around the shoulder nothing tells one posture from another: a hand that crosses it threw the arm about.
-    """
-    nearest, distance = chain.nearest_m, norm(position)
-    if distance >= nearest:
-        return position
-    return scale(nearest / distance, position) if distance > 1e-6 else (0.0, -nearest, 0.0)
-
-
-@inlined
 def report_error(arm: Record, asked: Vector, position: Vector) -> None:
     """Leave in `arm` how far the hand is from what was asked, where `position` was granted instead."""
     arm.position_error_m, arm.orientation_error_rad = arm.work.position_error_m, arm.work.orientation_error_rad
@@ -161,7 +141,7 @@ def find_target(arm: Record, settings: Record, asked: Vector, rotation: Columns)
     reach = reach_to(arm.chain, position)
     arm.restarted, arm.escape, arm.steady = 0, 0.0, 0
     store_wrench(arm.work.pull, NO_WRENCH)
-    work, budget, deadline = arm.work, settings.iterations, _deadline(settings)
+    work, budget, deadline = arm.work, settings.iterations, deadline_of(settings)
     status = _converge(arm, settings, position, rotation, _first_share(budget), 1.0, deadline)
     used = work.iterations
     for attempt in range(2):
@@ -181,7 +161,7 @@ def find_target(arm: Record, settings: Record, asked: Vector, rotation: Columns)
 def follow_target(arm: Record, settings: Record, position: Vector, rotation: Columns, reach: Reach) -> None:
     """Meet the next of a stream of targets from the configuration at hand: steps 2 to 5."""
     arm.restarted = 0
-    work, budget, deadline = arm.work, settings.iterations, _deadline(settings)
+    work, budget, deadline = arm.work, settings.iterations, deadline_of(settings)
     status = _converge(arm, settings, position, rotation, _first_share(budget), 1.0, deadline)
     used = work.iterations
     if not _finished(status) and work.position_error_m > settings.position_tolerance_m:
@@ -207,45 +187,9 @@ def follow_target(arm: Record, settings: Record, position: Vector, rotation: Col
 
 
 @compiled
-def reach_with_any_rotation(
-    arm: Record, settings: Record, position: Vector, rotation: Columns, reach: Reach, swivel: float, used: int
-) -> int:
-    """Put the hand where it should be at a given swivel, turned as far as the wrist goes. Return iterations.
-
-    In closed form, then by the loop where the shoulder's limits were in the way; undone if it is no nearer.
-    """
-    chain, work, q, kept = arm.chain, arm.work, arm.configuration, arm.kept
-    for i in range(10):
-        kept[i] = q[i]
-    position_error, orientation_error, held = work.position_error_m, work.orientation_error_rad, work.held
-    take(chain, posture_at(reach, rotation, swivel), q)
-    # Any rotation is within this tolerance: the loop would turn the hand by sliding the elbow on.
-    converge(
-        chain,
-        work,
-        q,
-        position,
-        rotation,
-        max(settings.iterations - used, 0),
-        POSITION_ALONE * settings.rotation_weight_m * settings.rotation_weight_m,
-        settings.position_tolerance_m,
-        2.0 * math.pi,
-        _deadline(settings),
-    )
-    used += work.iterations
-    if work.position_error_m > max(STUCK_M, position_error):
-        for i in range(10):
-            q[i] = kept[i]
-        work.position_error_m, work.orientation_error_rad, work.held = position_error, orientation_error, held
-    else:
-        arm.restarted, arm.status = 0, NEAREST
-    return used
-
-
-@compiled
 def escape(arm: Record, settings: Record, position: Vector, rotation: Columns, reach: Reach, dt_s: float) -> None:
     """Take one frame of the elbow's way to another swivel, the hand's position kept, its rotation as far as it goes."""
-    work, q, budget, deadline = arm.work, arm.configuration, settings.iterations, _deadline(settings)
+    work, q, budget, deadline = arm.work, arm.configuration, settings.iterations, deadline_of(settings)
     radius = max(reach[2] * arm.chain.upper_arm_m, 1e-3)
     most = min(ESCAPE_HASTE * settings.swivel_speed_rad_s * dt_s, ELBOW_STEP_M / radius)
     turn = clip(arm.escape, -most, most)
@@ -308,65 +252,6 @@ def _start_again(
         q[i] = kept[i]
     work.position_error_m, work.orientation_error_rad, work.held = position_error, orientation_error, held
     return status, used
-
-
-@compiled
-def hold_elbow(arm: Record, settings: Record, position: Vector, rotation: Columns, reach: Reach) -> bool:
-    """Step 6: where the elbow has gone too far from `arm.anchor`, turn it only part of the way, in closed form.
-
-    Returns whether it was free to go as far as it went.
-    """
-    chain, q, anchor = arm.chain, arm.configuration, arm.anchor
-    upper_arm = columns_of((anchor[0], anchor[1], anchor[2], anchor[3]))
-    moved = subtract(columns_of((q[0], q[1], q[2], q[3]))[1], upper_arm[1])
-    step_m = chain.upper_arm_m * norm(moved)
-    if step_m <= ELBOW_STEP_M:
-        return True
-    allowed_m = ELBOW_STEP_M + norm(subtract(position, wrist_at(chain, anchor)))
-    if step_m <= allowed_m:
-        return True
-    before = elbow_swivel(reach, upper_arm)
-    turn = wrap(elbow_swivel(reach, columns_of((q[0], q[1], q[2], q[3]))) - before)
-    most = ELBOW_STEP_M / max(reach[2] * chain.upper_arm_m, 1e-3)
-    swivel = before + clip(turn, -most, most)
-    arm.work.iterations = reach_with_any_rotation(arm, settings, position, rotation, reach, swivel, arm.work.iterations)
-    return False
-
-
-@compiled
-def hold_hand(
-    arm: Record, settings: Record, asked: Vector, position: Vector, rotation: Columns, missed: bool, dt_s: float
-) -> bool:
-    """Step 7: where the hand would leap to its `position`, it goes part of the way. Returns whether it was free to go.
-
-    `missed` tells whether it was elsewhere than asked one frame ago: a hand that follows does not leap.
-    """
-    chain, q, anchor = arm.chain, arm.configuration, arm.anchor
-    if not missed and arm.work.position_error_m <= STUCK_M:
-        return True
-    before = wrist_at(chain, anchor)
-    way = subtract(wrist_at(chain, q), before)
-    way_m = norm(way)
-    allowed_m = max(norm(subtract(asked, vector(arm.asked))), CATCH_UP_M_S * dt_s)
-    if way_m <= allowed_m:
-        return True
-    start = read_configuration(anchor)
-    motion = difference(start, read_configuration(q))
-    nearer = nearest_with_room(chain, add(before, scale(allowed_m / way_m, way)))
-    reach = reach_to(chain, nearer)
-    swivel = elbow_swivel(reach, columns_of((q[0], q[1], q[2], q[3])))
-    arm.work.iterations = reach_with_any_rotation(arm, settings, nearer, rotation, reach, swivel, arm.work.iterations)
-    moved_m, share = norm(subtract(wrist_at(chain, q), before)), 1.0
-    if moved_m > allowed_m + STUCK_M:
-        moved_m = way_m
-        for _ in range(PARTS):
-            if moved_m > allowed_m:
-                share *= allowed_m / moved_m
-                store_configuration(q, integrate(chain, start, tangent.scale(share, motion)))
-                moved_m = norm(subtract(wrist_at(chain, q), before))
-    arm.work.position_error_m = norm(subtract(position, wrist_at(chain, q)))
-    arm.status = NEAREST
-    return False
 
 
 @inlined

@@ -44,6 +44,18 @@ def reach_to(chain: Record, position: Vector) -> Reach:
     return (axis, low, cross(axis, low)), along / upper, off / upper, math.sqrt(1.0 - cosine * cosine), cosine
 
 
+@inlined
+def nearest_with_room(chain: Record, position: Vector) -> Vector:
+    """Return the wrist position itself, or the nearest that a fully bent elbow leaves room for.
+
+    In the hole around the shoulder nothing tells one posture from another: a hand that crosses it threw the arm about.
+    """
+    nearest, distance = chain.nearest_m, norm(position)
+    if distance >= nearest:
+        return position
+    return scale(nearest / distance, position) if distance > 1e-6 else (0.0, -nearest, 0.0)
+
+
 @compiled
 def swivel_of(reach: Reach, upper_arm: Columns) -> float:
     """Swivel of an upper arm about the line of `reach`."""

@@ -7,8 +7,9 @@ import pytest
 
 from arm_ik_service.arm.model import ArmModel
 from arm_ik_service.geometry import batch
-from arm_ik_service.ik.frame_step import CATCH_UP_M_S, ELBOW_STEP_M, STUCK_M
+from arm_ik_service.ik.any_rotation import STUCK_M
 from arm_ik_service.ik.jacobian_transpose import JacobianTranspose
+from arm_ik_service.ik.pace import CATCH_UP_M_S, ELBOW_STEP_M
 
 FRAMES, RATE_HZ = 1500, 90.0
 CARRY_M = 0.015  # of the elbow on its circle, as the reach changes from frame to frame

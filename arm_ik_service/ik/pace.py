@@ -1,0 +1,90 @@
+"""How far elbow and hand may move in a frame, whatever the solve came to."""
+
+from __future__ import annotations
+
+from arm_ik_service.arm import tangent
+from arm_ik_service.arm.chain import Columns, columns_of, wrist_at
+from arm_ik_service.arm.configuration import (
+    Configuration,
+    difference,
+    integrate,
+    read_configuration,
+    store_configuration,
+)
+from arm_ik_service.compiled import Record, compiled
+from arm_ik_service.geometry.scalar import Vector, add, clip, norm, scale, subtract, vector, wrap
+from arm_ik_service.ik.any_rotation import STUCK_M, reach_with_any_rotation
+from arm_ik_service.ik.conjugate import NEAREST, rotation_error
+from arm_ik_service.ik.jacobian import jacobian_at
+from arm_ik_service.ik.swivel import Reach, elbow_swivel, nearest_with_room, reach_to
+
+ELBOW_STEP_M = 0.04  # [m] of the elbow in one frame beyond what the hand moves, whatever the frame rate
+CATCH_UP_M_S = 10.0  # speed of a hand on the way back to where it is asked to be, unless it is asked to move faster
+PARTS = 4  # tries to find how much of a motion moves the hand as far as it may
+
+
+@compiled
+def hold_elbow(arm: Record, settings: Record, position: Vector, rotation: Columns, reach: Reach) -> bool:
+    """Where the elbow has gone too far from `arm.anchor`, turn it only part of the way, in closed form.
+
+    Returns whether it was free to go as far as it went.
+    """
+    chain, q, anchor = arm.chain, arm.configuration, arm.anchor
+    upper_arm = columns_of((anchor[0], anchor[1], anchor[2], anchor[3]))
+    moved = subtract(columns_of((q[0], q[1], q[2], q[3]))[1], upper_arm[1])
+    step_m = chain.upper_arm_m * norm(moved)
+    if step_m <= ELBOW_STEP_M:
+        return True
+    allowed_m = ELBOW_STEP_M + norm(subtract(position, wrist_at(chain, anchor)))
+    if step_m <= allowed_m:
+        return True
+    before = elbow_swivel(reach, upper_arm)
+    turn = wrap(elbow_swivel(reach, columns_of((q[0], q[1], q[2], q[3]))) - before)
+    most = ELBOW_STEP_M / max(reach[2] * chain.upper_arm_m, 1e-3)
+    swivel = before + clip(turn, -most, most)
+    arm.work.iterations = reach_with_any_rotation(arm, settings, position, rotation, reach, swivel, arm.work.iterations)
+    return False
+
+
+@compiled
+def hold_hand(
+    arm: Record, settings: Record, asked: Vector, position: Vector, rotation: Columns, missed: bool, dt_s: float
+) -> bool:
+    """Where the hand would leap to its `position`, it goes part of the way. Returns whether it was free to go.
+
+    `missed` tells whether it was elsewhere than asked one frame ago: a hand that follows does not leap.
+    """
+    chain, work, q = arm.chain, arm.work, arm.configuration
+    if not missed and work.position_error_m <= STUCK_M:
+        return True
+    before = wrist_at(chain, arm.anchor)
+    way = subtract(wrist_at(chain, q), before)
+    allowed_m = max(norm(subtract(asked, vector(arm.asked))), CATCH_UP_M_S * dt_s)
+    if norm(way) <= allowed_m:
+        return True
+    end, restarted = read_configuration(q), arm.restarted
+    nearer = nearest_with_room(chain, add(before, scale(allowed_m / norm(way), way)))
+    reach = reach_to(chain, nearer)
+    swivel = elbow_swivel(reach, columns_of(end[0]))
+    work.iterations = reach_with_any_rotation(arm, settings, nearer, rotation, reach, swivel, work.iterations)
+    arm.restarted = restarted  # the elbow has leapt all the same
+    if norm(subtract(wrist_at(chain, q), before)) > allowed_m + STUCK_M:  # not with these limits
+        _go_part_of_the_way(arm, end, before, norm(way), allowed_m)
+    here = jacobian_at(chain, read_configuration(q))
+    work.position_error_m = norm(subtract(position, here.from_shoulder))
+    work.orientation_error_rad = norm(rotation_error(here.hand, rotation))
+    arm.status = NEAREST
+    return False
+
+
+@compiled
+def _go_part_of_the_way(arm: Record, end: Configuration, before: Vector, way_m: float, allowed_m: float) -> None:
+    """Move all joints from `arm.anchor` towards a configuration, as far as takes the hand `allowed_m` from `before`."""
+    chain, q, start = arm.chain, arm.configuration, read_configuration(arm.anchor)
+    motion, share, moved_m = difference(start, end), 1.0, way_m
+    for _ in range(PARTS):
+        if moved_m > allowed_m:
+            share *= allowed_m / moved_m
+            store_configuration(q, integrate(chain, start, tangent.scale(share, motion)))
+            moved_m = norm(subtract(wrist_at(chain, q), before))
+    arm.restarted = 0
