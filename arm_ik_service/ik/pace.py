@@ -20,7 +20,7 @@ from arm_ik_service.ik.swivel import Reach, elbow_swivel, nearest_with_room, rea
 
 ELBOW_STEP_M = 0.04  # [m] of the elbow in one frame beyond what the hand moves, whatever the frame rate
 CATCH_UP_M_S = 10.0  # speed of a hand on the way back to where it is asked to be, unless it is asked to move faster
-PARTS = 4  # tries to find how much of a motion moves the hand as far as it may
+PARTS = 12  # tries to find how much of a motion moves the hand as far as it may: some sweep it far out first
 
 
 @compiled
