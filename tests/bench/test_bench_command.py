@@ -23,6 +23,7 @@ def test_the_table_has_a_row_for_every_solver_and_the_person(capture: Path) -> N
         assert text in outcome.stdout
 
 
+@pytest.mark.slow
 def test_json_is_one_object(capture: Path, headset_session: Path) -> None:
     arguments = ["bench", "solvers", str(capture), str(headset_session), *SOLVERS, "--frames", "20", "--json"]
     outcome = CliRunner().invoke(app, arguments)

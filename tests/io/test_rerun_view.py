@@ -227,6 +227,7 @@ def eyes_of(path: Path) -> list[dict[str, Any]]:
     return eyes
 
 
+@pytest.mark.slow
 def test_the_eye_goes_along_with_one_person_and_stays_where_it_sees_all_of_many(tmp_path: Path) -> None:
     alone, group = tmp_path / "alone.rrd", tmp_path / "group.rrd"
     for path, names in ((alone, ["ann"]), (group, ["ann", "bob", "cleo", "dan", "eve", "fay", "gus"])):

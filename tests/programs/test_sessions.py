@@ -71,7 +71,7 @@ def test_a_replay_is_answered_frame_by_frame_recorded_as_it_was_and_solved_again
     assert (report["compared"], report["different"], report["unanswered"]) == (len(answers), 0, 0)
 
 
-@pytest.mark.parametrize("jitter_buffer_s", [0.0, 0.05])
+@pytest.mark.parametrize("jitter_buffer_s", [0.0, pytest.param(0.05, marks=pytest.mark.slow)])
 def test_a_person_measured_while_they_are_recorded_is_solved_again_to_the_same_bytes(
     jitter_buffer_s: float, recording: Path, tmp_path: Path
 ) -> None:
