@@ -282,7 +282,6 @@ def step_frame(arm: Record, settings: Record, asked: Vector, rotation: Columns, 
     """Take one frame: position and rotation asked of the hand bone, right arm, ISB axes."""
     position = nearest_with_room(arm.chain, asked)
     reach = reach_to(arm.chain, position)
-    missed = arm.position_error_m > STUCK_M
     for i in range(10):
         arm.anchor[i] = arm.configuration[i]
     if arm.escape != 0.0:
@@ -298,7 +297,7 @@ def step_frame(arm: Record, settings: Record, asked: Vector, rotation: Columns, 
         arm.configuration[4] = min(angle_of(reach[3], reach[4]), arm.chain.upper[0])
         follow_target(arm, settings, position, rotation, reach)
     moved_freely = hold_elbow(arm, settings, position, rotation, reach)
-    moved_freely = hold_hand(arm, settings, asked, position, rotation, missed, dt_s) and moved_freely
+    moved_freely = hold_hand(arm, settings, asked, position, rotation, dt_s) and moved_freely
     moved_freely = moved_freely and arm.status == SOLVED and arm.work.held == 0 and arm.restarted == 0
     arm.steady, arm.frame_s = arm.steady + 1 if moved_freely else 0, dt_s
     report_error(arm, asked, position)

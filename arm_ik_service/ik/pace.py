@@ -47,29 +47,28 @@ def hold_elbow(arm: Record, settings: Record, position: Vector, rotation: Column
 
 
 @compiled
-def hold_hand(
-    arm: Record, settings: Record, asked: Vector, position: Vector, rotation: Columns, missed: bool, dt_s: float
-) -> bool:
+def hold_hand(arm: Record, settings: Record, asked: Vector, position: Vector, rotation: Columns, dt_s: float) -> bool:
     """Where the hand would leap to its `position`, it goes part of the way. Returns whether it was free to go.
 
-    `missed` tells whether it was elsewhere than asked one frame ago: a hand that follows does not leap.
+    To be called before the errors of this frame take the place of the last one's in `arm`.
     """
     chain, work, q = arm.chain, arm.work, arm.configuration
-    if not missed and work.position_error_m <= STUCK_M:
-        return True
+    if arm.position_error_m <= STUCK_M and work.position_error_m <= STUCK_M:
+        return True  # a hand that follows does not leap
     before = wrist_at(chain, arm.anchor)
     way = subtract(wrist_at(chain, q), before)
+    way_m = norm(way)
     allowed_m = max(norm(subtract(asked, vector(arm.asked))), CATCH_UP_M_S * dt_s)
-    if norm(way) <= allowed_m:
+    if way_m <= allowed_m:
         return True
     end, restarted = read_configuration(q), arm.restarted
-    nearer = nearest_with_room(chain, add(before, scale(allowed_m / norm(way), way)))
+    nearer = nearest_with_room(chain, add(before, scale(allowed_m / way_m, way)))
     reach = reach_to(chain, nearer)
     swivel = elbow_swivel(reach, columns_of(end[0]))
     work.iterations = reach_with_any_rotation(arm, settings, nearer, rotation, reach, swivel, work.iterations)
     arm.restarted = restarted  # the elbow has leapt all the same
     if norm(subtract(wrist_at(chain, q), before)) > allowed_m + STUCK_M:  # not with these limits
-        _go_part_of_the_way(arm, end, before, norm(way), allowed_m)
+        _go_part_of_the_way(arm, end, before, way_m, allowed_m)
     here = jacobian_at(chain, read_configuration(q))
     work.position_error_m = norm(subtract(position, here.from_shoulder))
     work.orientation_error_rad = norm(rotation_error(here.hand, rotation))
@@ -79,12 +78,16 @@ def hold_hand(
 
 @compiled
 def _go_part_of_the_way(arm: Record, end: Configuration, before: Vector, way_m: float, allowed_m: float) -> None:
-    """Move all joints from `arm.anchor` towards a configuration, as far as takes the hand `allowed_m` from `before`."""
+    """Move all joints from `arm.anchor` towards a configuration, as far as takes the hand `allowed_m` from `before`.
+
+    All of that motion would take it `way_m`, which is more.
+    """
     chain, q, start = arm.chain, arm.configuration, read_configuration(arm.anchor)
     motion, share, moved_m = difference(start, end), 1.0, way_m
     for _ in range(PARTS):
-        if moved_m > allowed_m:
-            share *= allowed_m / moved_m
-            store_configuration(q, integrate(chain, start, tangent.scale(share, motion)))
-            moved_m = norm(subtract(wrist_at(chain, q), before))
+        share *= allowed_m / moved_m
+        store_configuration(q, integrate(chain, start, tangent.scale(share, motion)))
+        moved_m = norm(subtract(wrist_at(chain, q), before))
+        if moved_m <= allowed_m:
+            break
     arm.restarted = 0

@@ -10,7 +10,7 @@ from pathlib import Path
 from arm_ik_service.errors import SessionError
 from arm_ik_service.io.npz import NpzSessionWriter
 from arm_ik_service.io.recording import RecordingWriter
-from arm_ik_service.io.session import RecordedFrame, RecordedProfile, Session
+from arm_ik_service.io.session import RecordedFrame, RecordedProfile, Session, require_avatar
 from arm_ik_service.wire.messages import ArmsState
 
 Progress = Callable[[int], None]  # told how many more frames are done
@@ -29,8 +29,7 @@ def convert_session(
     """
     if output.exists() and output.samefile(session.path):
         raise SessionError(f"{output}: is the session itself; write to another file")
-    if avatar is not None and avatar not in session.avatars:
-        raise SessionError(f"{session.path}: no avatar {avatar!r}; it has {', '.join(session.avatars)}")
+    require_avatar(session, avatar)
     if output.suffix == ".mcap":
         return _to_mcap(session, output, avatar, progress)
     if output.suffix == ".npz":

@@ -106,6 +106,12 @@ def open_session(path: Path) -> Session:
     )
 
 
+def require_avatar(session: Session, avatar: str | None) -> None:
+    """Raise SessionError where a session has no frame of an avatar that is asked for; None asks for everybody."""
+    if avatar is not None and avatar not in session.avatars:
+        raise SessionError(f"{session.path}: no avatar {avatar!r}; it has {', '.join(session.avatars)}")
+
+
 def answered_frames(session: Session) -> Iterator[tuple[RecordedFrame | None, ArmsState]]:
     """Read every answer with the frame that it answers, received when the service's stamp says; None: not recorded.
 

@@ -102,7 +102,7 @@ def _configuration(options: BusOptions, role: Role) -> zenoh.Config:
         put("transport/link/tx/keep_alive", KEEP_ALIVES_PER_LEASE)
     if options.tls is not None:
         _put_tls(options.tls, put)
-    if options.config_file is None:
+    if options.config_file is None:  # after TLS, whose section is put as a whole
         _bound_what_waits(role, put)
     if options.access_file is not None:
         try:

@@ -12,9 +12,9 @@ from arm_ik_service.arm.model import LIMITS
 from arm_ik_service.body.profile import Profile
 from arm_ik_service.body.report import ArmReport, report_arm
 from arm_ik_service.errors import SessionError
-from arm_ik_service.io.session import RecordedFrame, Session
+from arm_ik_service.io.session import RecordedFrame, Session, require_avatar
 from arm_ik_service.programs.calibrator import as_records
-from arm_ik_service.programs.offline import receive_times, require_avatar, solve_frames
+from arm_ik_service.programs.offline import receive_times, solve_frames
 from arm_ik_service.settings import Settings
 from arm_ik_service.tracking.report import SessionReport, report_session
 from arm_ik_service.wire.messages import SIDES, ArmsState, Side

@@ -14,8 +14,8 @@ from arm_ik_service.exports.dialects import McapDialect
 from arm_ik_service.exports.extras import optional_libraries
 from arm_ik_service.exports.mcap_files import WRITERS, StateWriter
 from arm_ik_service.exports.mirror import mirrored
-from arm_ik_service.io.session import Session
-from arm_ik_service.programs.offline import profiles_for, require_avatar, solve_frames
+from arm_ik_service.io.session import Session, require_avatar
+from arm_ik_service.programs.offline import profiles_for, solve_frames
 from arm_ik_service.settings import Settings
 from arm_ik_service.wire.messages import ArmsState
 

@@ -12,7 +12,7 @@ from arm_ik_service.avatar import Avatars
 from arm_ik_service.body.profile import Profile
 from arm_ik_service.errors import SessionError
 from arm_ik_service.io.recording import RecordingWriter
-from arm_ik_service.io.session import RecordedFrame, Session
+from arm_ik_service.io.session import RecordedFrame, Session, require_avatar
 from arm_ik_service.io.solution import SolutionWriter
 from arm_ik_service.settings import Settings
 from arm_ik_service.tracking.state import ACCEPTED
@@ -34,12 +34,6 @@ def profile_in(session: Session, avatar: str) -> Profile | None:
 def profiles_for(session: Session, stated: Profile | None = None) -> dict[str, Profile]:
     """Return what each avatar is to be solved with: the stated profile, their recorded one, or an average person's."""
     return {avatar: stated or profile_in(session, avatar) or Profile() for avatar in session.avatars}
-
-
-def require_avatar(session: Session, avatar: str | None) -> None:
-    """Raise SessionError where a session has no frame of an avatar that is asked for; None asks for everybody."""
-    if avatar is not None and avatar not in session.avatars:
-        raise SessionError(f"{session.path}: no avatar {avatar!r}; it has {', '.join(session.avatars)}")
 
 
 def receive_times(frames: Iterator[RecordedFrame]) -> Iterator[tuple[RecordedFrame, int]]:
