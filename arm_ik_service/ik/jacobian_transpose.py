@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from arm_ik_service.arm.chain import columns_of, hand_to_arm, position_to_arm
+from arm_ik_service.arm.chain import columns_of, hand_to_arm, position_to_arm, wrist_at
 from arm_ik_service.arm.model import ArmModel
 from arm_ik_service.compiled import compiled
+from arm_ik_service.geometry.scalar import store
 from arm_ik_service.ik.frame_step import find_target, first_frame, step_frame
 from arm_ik_service.ik.solver import Solution, Status, Track, as_targets
 from arm_ik_service.ik.state import new_arm
@@ -121,11 +122,13 @@ def _track(
 ) -> None:
     arm, setting = arms[0], settings[0]
     chain, work = arm.chain, arm.work
-    arm.swivel_speed, arm.escape, arm.steady, work.position_error_m = 0.0, 0.0, 0, 0.0
+    arm.swivel_speed, arm.escape, arm.steady = 0.0, 0.0, 0
+    arm.position_error_m, work.position_error_m = 0.0, 0.0
     for i in range(len(arm.habit)):
         arm.habit[i] = 0.0
     for i in range(10):
         arm.configuration[i] = start[i]
+    store(arm.asked, wrist_at(chain, arm.configuration))
     for n in range(len(targets)):
         position = position_to_arm(chain, (targets[n, 0], targets[n, 1], targets[n, 2]))
         rotation = columns_of(hand_to_arm(chain, (targets[n, 3], targets[n, 4], targets[n, 5], targets[n, 6])))

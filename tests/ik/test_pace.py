@@ -59,6 +59,18 @@ def test_a_hand_that_was_held_back_comes_back_no_faster_than_it_is_asked_to_move
     assert np.max(steps - np.maximum(asked, CATCH_UP_M_S / RATE_HZ)) < STUCK_M
 
 
+def test_a_track_from_a_start_is_the_same_whatever_was_tracked_before() -> None:
+    arm = ArmModel.load(side="right")
+    fresh, used = (JacobianTranspose(arm, frame_rate_hz=RATE_HZ) for _ in range(2))
+    targets = roaming(0)
+    held_back = np.flatnonzero(used.track(targets).position_error_m > STUCK_M)
+    used.track(targets[: held_back[-1] + 1])  # ends with a hand that would have to come back
+    for n in held_back[::10]:  # from rest that is a leap to a hand that cannot be met
+        one = targets[n : n + 1]
+        np.testing.assert_array_equal(used.track(one, arm.rest).configuration, fresh.track(one, arm.rest).configuration)
+        fresh = JacobianTranspose(arm, frame_rate_hz=RATE_HZ)
+
+
 def test_the_budget_is_kept_on_the_most_hostile_stream() -> None:
     solver = JacobianTranspose(ArmModel.load(side="right"), iterations=20)
     assert solver.track(tumbling(7)).iterations.max() <= 20
