@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -106,15 +107,21 @@ class Line:
 
 
 def take_turns(lines: list[Line], rate_hz: float, frames: int, progress: Callable[[int], None] | None = None) -> None:
-    """Send `frames` on every line at `rate_hz`, the lines evenly shifted, so that noise falls on all of them alike."""
+    """Send `frames` on every line at `rate_hz`, the lines evenly shifted, so that noise falls on all of them alike.
+
+    In every period their order is drawn anew: whoever always came second would always find the processors awake, and
+    in their caches what the first one's onlookers do.
+    """
     slot_s = 1.0 / rate_hz / len(lines)
+    chance = random.Random(0)
     start_s = time.monotonic() + 0.01
-    for n in range((frames + WARM_UP_FRAMES) * len(lines)):
-        wait_s = start_s + n * slot_s - time.monotonic()
-        if wait_s > 0.0:
-            time.sleep(wait_s)
-        lines[n % len(lines)].send()
-        if progress is not None and n % len(lines) == 0:
+    for n in range(frames + WARM_UP_FRAMES):
+        for k, line in enumerate(chance.sample(lines, len(lines))):
+            wait_s = start_s + (n * len(lines) + k) * slot_s - time.monotonic()
+            if wait_s > 0.0:
+                time.sleep(wait_s)
+            line.send()
+        if progress is not None:
             progress(1)
     give_up_s = time.monotonic() + ANSWERED_WITHIN_S
     while any(len(line.come_ns) < len(line.put_ns) for line in lines) and time.monotonic() < give_up_s:

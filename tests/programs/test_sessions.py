@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import os
 import math
 import signal
 import subprocess
@@ -117,6 +118,8 @@ def test_killing_every_other_program_leaves_the_service_answering_and_a_log_that
     ]
     for process in doomed[1:]:
         process.wait_ready()
+    if hasattr(os, "SCHED_IDLE"):  # nobody waits for a file, but a recording must not lose anything
+        assert [os.sched_getscheduler(process.popen.pid) for process in doomed[1:]] == [os.SCHED_OTHER, os.SCHED_IDLE]
     player = Running("replay", str(recording), "--to", "4", *connect)
     assert wait_for(lambda: service.answered_and_overtaken("demo") > 0, 20.0)
     for process in doomed:
