@@ -115,7 +115,7 @@ def _run(
     arm = arms[0]
     for n in range(len(targets)):
         step_arm(arm, targets[n], dt_s, settings[0])
-        configuration[n, :] = arm.configuration
+        configuration[n, :] = arm.shown
         velocity[n, :] = arm.velocity
         position_error[n] = arm.position_error_m
         orientation_error[n] = arm.orientation_error_rad

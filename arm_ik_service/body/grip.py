@@ -63,7 +63,7 @@ def learn_grip(body: Record, tracking: Record, arms: Record, elapsed_s: float) -
     for k in range(2):
         arm, hand = arms[k], tracking.hands[k]
         seen = hand.position_age_s == 0.0 and hand.rotation_age_s == 0.0
-        if seen and arm.orientation_error_rad > ENOUGH_RAD and arm.work.position_error_m < MET_M:
+        if seen and arm.work.orientation_error_rad > ENOUGH_RAD and arm.work.position_error_m < MET_M:
             short = mirrored_turn(_shortfall(body.targets[k], arm), k)
             turning = min(g.norm(g.vector(hand.angular_velocity)) / TURNING_RAD_S, 1.0)
             turn = g.add(turn, g.scale(0.5 * pace * turning, short))

@@ -49,6 +49,7 @@ SEEDS = 24  # swivels looked at when there is no good start: every 15 degrees
 FLAT = 0.3  # curvature below which discomfort counts as flat: Newton's step would be too long
 GIVE_TIME_S = 0.3  # in which the carrying angle and the wrist's axial play come back to zero
 HALF_SURE = 1.0  # curvature at which the elbow's confidence is one half
+CARRIED = 0.7  # of an arm's bend that may be carrying angle
 STEADY = 8  # frames without a limit before a motion is carried on: one that leaves a limit is not the one that came
 STUCK_RAD = 0.26  # a hand turned further off than this (15 degrees) is worth the elbow's way to another swivel
 ESCAPE_HASTE = 2.0  # times swivel_speed_rad_s on that way
@@ -277,6 +278,15 @@ def carry_on(arm: Record, towards_comfort: Tangent, dt_s: float) -> None:
     store_configuration(arm.configuration, integrate(chain, start, towards_comfort))
 
 
+@inlined
+def bend(arm: Record, reach: Reach) -> None:
+    """Flex the elbow as far as the target's distance says, given the carrying angle, which bends the arm too."""
+    q, bent = arm.configuration, angle_of(reach[3], reach[4])
+    q[5] = clip(q[5], -CARRIED * bent, CARRIED * bent)
+    cosine = reach[4] / math.cos(q[5])
+    q[4] = min(angle_of(math.sqrt(max(1.0 - cosine * cosine, 0.0)), cosine), arm.chain.upper[0])
+
+
 @compiled
 def step_frame(arm: Record, settings: Record, asked: Vector, rotation: Columns, dt_s: float) -> None:
     """Take one frame: position and rotation asked of the hand bone, right arm, ISB axes."""
@@ -294,7 +304,7 @@ def step_frame(arm: Record, settings: Record, asked: Vector, rotation: Columns, 
             arm.swivel_speed = 0.0
         carry_on(arm, swivel, dt_s)
         # The target's distance tells the elbow's flexion; a straight arm could not tell the loop the way back.
-        arm.configuration[4] = min(angle_of(reach[3], reach[4]), arm.chain.upper[0])
+        bend(arm, reach)
         follow_target(arm, settings, position, rotation, reach)
     moved_freely = hold_elbow(arm, settings, position, rotation, reach)
     moved_freely = hold_hand(arm, settings, asked, position, rotation, dt_s) and moved_freely

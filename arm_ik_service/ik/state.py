@@ -20,7 +20,7 @@ ARM = record_dtype(
         ("work", WORK),
         # memory
         ("started", np.int64),  # 0: no frame yet; else 1 and the frames on end with the hand met at the same limits
-        ("before", np.float64, (10,)),  # configuration one frame ago
+        ("before", np.float64, (10,)),  # what was shown one frame ago
         ("recent_velocity", np.float64, (9,)),  # mean over the last frame
         ("habit", np.float64, (2,)),  # usual wrist flexion and deviation [rad]
         ("swivel_speed", np.float64),  # [rad/s] of the elbow about the arm's line, for comfort
@@ -30,9 +30,16 @@ ARM = record_dtype(
         ("kept", np.float64, (10,)),  # the best so far while another start is tried
         ("asked", np.float64, (3,)),  # of the hand one frame ago [m], in the arm's axes
         ("anchor", np.float64, (10,)),  # configuration at the beginning of the frame
+        ("calm_started", np.int64),  # 1: there was a frame before, of which the solve had
+        ("calm_wrist", np.float64, (3,)),  # its wrist there [m],
+        ("calm_axis", np.float64, (3,)),  # the line to it [unit],
+        ("calm_side", np.float64, (3,)),  # and its elbow in this direction from that line [unit]
+        ("calm_turn", np.float64),  # [rad] about that line, from the solve's elbow to the one shown
+        ("calm_speed", np.float64),  # [rad/s] of the one shown
         # the answer; positions and rotations in the shoulder frame of the arm's own side
         ("configuration", np.float64, (10,)),
-        ("published", np.float64, (10,)),  # the configuration itself, or where its velocity leads to
+        ("shown", np.float64, (10,)),  # the configuration with its elbow calmed
+        ("published", np.float64, (10,)),  # the one shown, or where its velocity leads to
         ("velocity", np.float64, (9,)),  # [rad/s], tangent order
         ("angles", np.float64, (9,)),  # arm.model.ANGLES [rad]
         ("angle_rates", np.float64, (9,)),  # [rad/s]
@@ -62,6 +69,7 @@ def initialise_arm(arm: Record, model: ArmModel) -> None:
     arm["comfort"] = list(COMFORT.values())
     arm["configuration"] = model.rest
     arm["before"] = model.rest
+    arm["shown"] = model.rest
 
 
 def new_arm(model: ArmModel) -> npt.NDArray[Any]:

@@ -20,6 +20,7 @@ from arm_ik_service.arm.configuration import difference, integrate, read_configu
 from arm_ik_service.arm.limits import swing_excess, swing_surely_inside, twist_excess, twist_of
 from arm_ik_service.compiled import Record, compiled
 from arm_ik_service.geometry.scalar import clip, quaternion, scale, store, vector
+from arm_ik_service.ik.calm import calm
 from arm_ik_service.ik.conjugate import SOLVED
 from arm_ik_service.ik.frame_step import first_frame, step_frame
 from arm_ik_service.ik.state import ARM, initialise_arm
@@ -37,21 +38,22 @@ def step_arm(arm: Record, target: Record, dt_s: float, settings: Record) -> None
 
     `dt_s` is the time since the last frame. Never fails: what cannot be met is met as nearly as can be.
     """
-    chain, q = arm.chain, arm.configuration
+    chain = arm.chain
     dt_s = clip(dt_s, MIN_DT_S, MAX_DT_S)
     position = position_to_arm(chain, vector(target.position))
     rotation = columns_of(hand_to_arm(chain, quaternion(target.rotation)))
     for i in range(10):
-        arm.before[i] = q[i]
+        arm.before[i] = arm.shown[i]
     if arm.started == 0:
         first_frame(arm, settings, position, rotation)
     else:
         step_frame(arm, settings, position, rotation, dt_s)
+    calm(arm, settings, rotation, dt_s)
     linear = position_to_arm(chain, vector(target.linear_velocity))
     angular = spin_to_arm(chain, vector(target.angular_velocity))
     _move_on(arm, settings, linear, angular, dt_s)
     for i in range(10):
-        arm.published[i] = q[i]
+        arm.published[i] = arm.shown[i]
     _show(arm)
 
 
@@ -65,9 +67,9 @@ def show_ahead(arm: Record, ahead_s: float) -> None:
 @compiled
 def _move_on(arm: Record, settings: Record, linear: Any, angular: Any, dt_s: float) -> None:
     """Find the joint velocity: recent motion carried on, corrected by the hand's twist, scaled to speed limits."""
-    chain, q = arm.chain, read_configuration(arm.configuration)
+    chain, q = arm.chain, read_configuration(arm.shown)
     # A hand that limits hold back does not move as it is asked to, nor does an arm that comes upon one or leaves it.
-    limits = limits_at(chain, arm.configuration)
+    limits = limits_at(chain, arm.shown)
     met = arm.status == SOLVED and limits == arm.limits & ~SPEED_BIT
     follows = met and (limits == 0 or arm.started > MET_FRAMES)
     onward = tangent.STILL
@@ -129,7 +131,7 @@ def _show(arm: Record) -> None:
 def predict(arm: Record, ahead_s: float, configuration: Any) -> None:
     """Write the configuration (10,) that the arm's velocity leads to in `ahead_s`, inside the limits."""
     motion = tangent.scale(ahead_s, tangent.read(arm.velocity))
-    store_configuration(configuration, integrate(arm.chain, read_configuration(arm.configuration), motion))
+    store_configuration(configuration, integrate(arm.chain, read_configuration(arm.shown), motion))
 
 
 __all__ = ["ARM", "initialise_arm", "limits_at", "predict", "show_ahead", "step_arm"]

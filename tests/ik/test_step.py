@@ -102,7 +102,7 @@ def test_bones_are_the_forward_kinematics_of_the_configuration() -> None:
         arms = new_arm(arm)
         for target in targets_of(smooth_stream(3, arm), DT_S)[:20]:
             step_arm(arms[0], target, DT_S, SETTINGS)
-            poses = arm.forward(arms[0].configuration)
+            poses = arm.forward(arms[0].shown)
             np.testing.assert_allclose(arms[0].elbow, poses["elbow"][:3])
             np.testing.assert_allclose(arms[0].wrist, poses["hand"][:3])
             np.testing.assert_allclose(arms[0].forearm_rotation, poses["elbow"][3:])
@@ -129,7 +129,7 @@ def test_the_mask_names_the_limits_that_the_arm_rests_on() -> None:
         step_arm(arms[0], target[0], DT_S, SETTINGS)
     names = {name for bit, name in enumerate(LIMITS) if arms[0].limits >> bit & 1}
     assert "elbow_flexion" in names
-    assert arms[0].configuration[4] == pytest.approx(RIGHT.upper[0])
+    assert arms[0].shown[4] == pytest.approx(RIGHT.upper[0])
 
 
 def test_a_teleporting_hand_is_followed_and_stays_finite() -> None:
@@ -167,7 +167,7 @@ arm = ArmModel.load()
 arms, settings = new_arm(arm), to_record(SolverSettings())
 for target in targets_of(random_stream(arm, 0, frames=12)[1], 1 / 90):
     step_arm(arms[0], target, 1 / 90, settings)
-print(repr(np.concatenate([arms[0].configuration, arms[0].velocity]).tolist()))
+print(repr(np.concatenate([arms[0].shown, arms[0].velocity]).tolist()))
 """
 
 

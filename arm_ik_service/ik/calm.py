@@ -1,0 +1,203 @@
+"""The arm as it is shown: its elbow follows the solve's about the line from shoulder to wrist, calmly.
+
+The solve answers every frame for itself. Where a joint's limit is in the way its elbow starts, stops and leaps within a
+frame, as no elbow of a person does. What is shown follows it in about the time in which the hand moves on by
+`elbow_lag_m`: an elbow hardly moves while a hand only turns in its place, and at once when the hand goes somewhere
+(both as measured on recorded arms). The hand itself stays where it is; it is turned less than asked for as long as the
+wrist would be beyond its limits.
+
+The solve does not know what is shown, so nothing can swing up between the two. The elbow's turn is measured against
+the line's own motion (parallel transport), which has no preferred direction and therefore no pole.
+"""
+
+from __future__ import annotations
+
+import math
+
+from arm_ik_service.arm.chain import Columns, columns_of, turn_group, wrist_at
+from arm_ik_service.arm.limits import swing_excess, swing_surely_inside, twist_excess, twist_of
+from arm_ik_service.compiled import Record, compiled, inlined
+from arm_ik_service.geometry.scalar import (
+    Vector,
+    add,
+    clip,
+    cross,
+    dot,
+    from_columns,
+    norm,
+    scale,
+    store,
+    subtract,
+    vector,
+)
+from arm_ik_service.geometry.trigonometry import angle_of, sine_cosine
+from arm_ik_service.ik.conjugate import NEAREST, SOLVED, rotation_error
+from arm_ik_service.ik.swivel import beyond, from_above
+
+LONGEST_S = 0.2  # that an elbow takes while the hand rests
+MOST_M_S2 = 30.0  # acceleration of an elbow about the line
+SMALLEST_LEVER_M = 0.02  # of the elbow about the line, for that: nobody sees a straight arm turn
+FASTEST_RAD_S = 20.0  # about the line; what is faster is a leap, which leaves no swing behind
+LARGEST_RAD = 0.3  # by which an elbow comes after the solve's: from farther away there may be no way
+MOST_MISSED_RAD2 = 0.12**2  # of the hand's rotation, squared, for the elbow's sake
+UNSEEN_RAD = 1e-5  # a turn that is not worth the work
+PARTS, HALVINGS = 8, 3  # tries to find how much of a turn the joints allow
+
+
+@compiled
+def calm(arm: Record, settings: Record, rotation: Columns, dt_s: float) -> None:
+    """Write to `arm.shown` the configuration with its elbow where it is to be seen; `rotation` is asked of the hand."""
+    chain, q = arm.chain, arm.configuration
+    for i in range(10):
+        arm.shown[i] = q[i]
+    if settings.elbow_lag_m == 0.0:
+        return
+    wrist, upper_arm = wrist_at(chain, q), columns_of((q[0], q[1], q[2], q[3]))
+    distance = norm(wrist)
+    axis = scale(1.0 / distance, wrist) if distance > 1e-9 else (0.0, -1.0, 0.0)
+    side = _side_of(axis, upper_arm)
+    if arm.calm_started == 0:
+        arm.calm_started, arm.calm_turn, arm.calm_speed = 1, 0.0, 0.0
+    else:
+        came_from = _transported(vector(arm.calm_side), vector(arm.calm_axis), axis)
+        to_go = angle_of(dot(cross(came_from, side), axis), dot(came_from, side)) - arm.calm_turn
+        along = dot(upper_arm[1], axis)
+        lever_m = chain.upper_arm_m * math.sqrt(max(1.0 - along * along, 0.0))
+        speed_m_s = norm(subtract(wrist, vector(arm.calm_wrist))) / dt_s
+        time_s = min(settings.elbow_lag_m / max(speed_m_s, 1e-6), LONGEST_S)
+        wanted = _follow(arm, to_go, time_s, MOST_M_S2 / max(lever_m, SMALLEST_LEVER_M), dt_s) - to_go
+        turn, missed = clip(wanted, -LARGEST_RAD, LARGEST_RAD), 0.0
+        if abs(turn) > UNSEEN_RAD:
+            turn, missed = _turned(arm, axis, upper_arm, turn)
+        if turn == wanted:
+            arm.restarted = 0  # who looks on sees no leap
+        else:
+            speed = (to_go + turn) / dt_s
+            arm.calm_speed = speed if abs(speed) < FASTEST_RAD_S else 0.0
+        arm.calm_turn = turn
+        if missed > 0.0:
+            _report(arm, settings, rotation)
+    store(arm.calm_wrist, wrist)
+    store(arm.calm_axis, axis)
+    store(arm.calm_side, side)
+
+
+@inlined
+def _side_of(axis: Vector, upper_arm: Columns) -> Vector:
+    side = cross(axis, upper_arm[2])
+    length = norm(side)
+    return scale(1.0 / length, side) if length > 1e-9 else upper_arm[0]
+
+
+@inlined
+def _transported(side: Vector, before: Vector, axis: Vector) -> Vector:
+    """Take a direction square to the line `before` along to `axis`, by the smallest turn there is."""
+    c, w = dot(before, axis), cross(before, axis)
+    if c < -0.99:
+        return side
+    return add(add(scale(c, side), cross(w, side)), scale(dot(w, side) / (1.0 + c), w))
+
+
+@inlined
+def _follow(arm: Record, to_go: float, time_s: float, most: float, dt_s: float) -> float:
+    """Step [rad] of a critically damped follower whose acceleration is bounded [rad/s^2]."""
+    stiff = 2.0 * dt_s / max(time_s, 1e-6)
+    speed = (arm.calm_speed + stiff * stiff / dt_s * to_go) / (1.0 + 2.0 * stiff + stiff * stiff)
+    gain = most * dt_s
+    slowest, fastest = arm.calm_speed - gain, arm.calm_speed + gain
+    speed = clip(speed, slowest, fastest)
+    # no faster than what can be stopped on the way that is left
+    stoppable = max(math.sqrt(2.0 * most * abs(to_go) + 0.25 * gain * gain) - 0.5 * gain, 0.0)
+    speed = clip(clip(speed, -stoppable, stoppable), slowest, fastest)
+    arm.calm_speed = speed
+    return float(speed * dt_s)
+
+
+@compiled
+def _turned(arm: Record, axis: Vector, upper_arm: Columns, turn: float) -> tuple[float, float]:
+    """Turn the shown arm about the line, past its hand, as far as its joints allow.
+
+    Returns how far [rad], and the square of what is missed of the hand's rotation [rad^2].
+    """
+    q, shown = arm.configuration, arm.shown
+    hand = turn_group(turn_group(upper_arm, q[4], q[5], q[6])[2], q[7], q[8], 0.0)[2]  # its axial play stays
+    missed = _take(arm, axis, upper_arm, hand, turn)
+    if missed < MOST_MISSED_RAD2:
+        return turn, missed
+    allowed, refused, least = 0.0, turn, 0.0
+    for i in range(1, PARTS):
+        tried = turn * (1.0 - i / PARTS)
+        missed = _take(arm, axis, upper_arm, hand, tried)
+        if missed < MOST_MISSED_RAD2:
+            allowed, least = tried, missed
+            break
+        refused = tried
+    for _ in range(HALVINGS):
+        tried = 0.5 * (allowed + refused)
+        missed = _take(arm, axis, upper_arm, hand, tried)
+        if missed < MOST_MISSED_RAD2:
+            allowed, least = tried, missed
+        else:
+            refused = tried
+    if allowed == 0.0:
+        for i in range(10):
+            shown[i] = q[i]
+    return allowed, least
+
+
+@compiled
+def _take(arm: Record, axis: Vector, upper_arm: Columns, hand: Columns, turn: float) -> float:
+    """Turn the shown arm about the line, past its hand, unless the joints forbid it.
+
+    Returns the square of what would be missed of the hand's rotation [rad^2]; infinity where the shoulder forbids it.
+    """
+    chain, q, shown = arm.chain, arm.configuration, arm.shown
+    s, c = sine_cosine(turn)
+    base = (
+        _rotated(axis, s, c, upper_arm[0]),
+        _rotated(axis, s, c, upper_arm[1]),
+        _rotated(axis, s, c, upper_arm[2]),
+    )
+    if not _shoulder_allows(chain, base):
+        return math.inf
+    x, y, z = turn_group(base, q[4], q[5], 0.0)[2]
+    tx, ty, tz = hand
+    sine = clip(dot(y, tx), -1.0, 1.0)
+    pronation = from_above(angle_of(-dot(z, tx), dot(x, tx)))
+    flexion = angle_of(sine, math.sqrt(1.0 - sine * sine))
+    deviation = angle_of(-dot(y, tz), dot(y, ty))
+    lower, upper = chain.lower, chain.upper
+    missed = beyond(pronation, lower[2], upper[2]) + beyond(flexion, lower[3], upper[3])
+    missed += beyond(deviation, lower[4], upper[4])
+    if missed < MOST_MISSED_RAD2:
+        shoulder = from_columns(*base)
+        for i in range(4):
+            shown[i] = shoulder[i]
+        shown[6] = clip(pronation, lower[2], upper[2])
+        shown[7] = clip(flexion, lower[3], upper[3])
+        shown[8] = clip(deviation, lower[4], upper[4])
+    return missed
+
+
+@inlined
+def _rotated(axis: Vector, s: float, c: float, v: Vector) -> Vector:
+    return add(add(scale(c, v), scale(s, cross(axis, v))), scale((1.0 - c) * dot(axis, v), axis))
+
+
+@inlined
+def _shoulder_allows(chain: Record, bone: Columns) -> bool:
+    twist, height = twist_of(bone), -bone[1][1]
+    if twist_excess(chain, twist, height) != 0.0:
+        return False
+    return swing_surely_inside(chain, bone) or swing_excess(chain, scale(-1.0, bone[1])) <= 0.0
+
+
+@inlined
+def _report(arm: Record, settings: Record, rotation: Columns) -> None:
+    """Leave in `arm` how far the hand that is shown is turned from what was asked."""
+    q = arm.shown
+    base = columns_of((q[0], q[1], q[2], q[3]))
+    hand = turn_group(turn_group(base, q[4], q[5], q[6])[2], q[7], q[8], q[9])[2]
+    arm.orientation_error_rad = norm(rotation_error(hand, rotation))
+    if arm.status == SOLVED and arm.orientation_error_rad > 2.0 * settings.orientation_tolerance_rad:
+        arm.status = NEAREST
