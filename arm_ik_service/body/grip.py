@@ -47,8 +47,8 @@ def mirrored_turn(turn: Vector, k: int) -> Vector:
 
 @compiled
 def _shortfall(target: Record, arm: Record) -> Vector:
-    """Rotation vector, in the wrist's frame, from the rotation asked for to the nearest that the arm found."""
-    short = g.log(g.multiply(g.conjugate(g.quaternion(target.rotation)), g.quaternion(arm.hand_rotation)))
+    """Rotation vector, in the wrist's frame, from the rotation asked for to the nearest that the solve found."""
+    short = g.log(g.multiply(g.conjugate(g.quaternion(target.rotation)), g.quaternion(arm.hand_found)))
     angle = g.norm(short)
     return g.scale(min(angle - ENOUGH_RAD, LARGEST_SHORTFALL_RAD) / angle, short)
 

@@ -50,6 +50,7 @@ ARM = record_dtype(
         ("upper_arm_rotation", np.float64, (4,)),  # ISB bone axes
         ("forearm_rotation", np.float64, (4,)),
         ("hand_rotation", np.float64, (4,)),  # OpenXR wrist frame
+        ("hand_found", np.float64, (4,)),  # the same of the solve, before its elbow is calmed
         ("position_error_m", np.float64),
         ("orientation_error_rad", np.float64),
         ("elbow_confidence", np.float64),  # 0: any swivel is as comfortable; 1: the comfort is sharp

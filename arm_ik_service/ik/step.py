@@ -55,6 +55,10 @@ def step_arm(arm: Record, target: Record, dt_s: float, settings: Record) -> None
     for i in range(10):
         arm.published[i] = arm.shown[i]
     _show(arm)
+    found = quaternion(arm.hand_rotation)
+    if arm.orientation_error_rad != arm.work.orientation_error_rad:  # turned less than it was solved
+        found = hand_from_arm(chain, forward(chain, arm.configuration)[4])
+    store(arm.hand_found, found)
 
 
 @compiled
