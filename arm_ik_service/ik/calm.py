@@ -17,19 +17,7 @@ import math
 from arm_ik_service.arm.chain import Columns, columns_of, turn_group, wrist_at
 from arm_ik_service.arm.limits import swing_excess, swing_surely_inside, twist_excess, twist_of
 from arm_ik_service.compiled import Record, compiled, inlined
-from arm_ik_service.geometry.scalar import (
-    Vector,
-    add,
-    clip,
-    cross,
-    dot,
-    from_columns,
-    norm,
-    scale,
-    store,
-    subtract,
-    vector,
-)
+from arm_ik_service.geometry.scalar import Vector, add, clip, cross, dot, multiply, norm, scale, store, subtract, vector
 from arm_ik_service.geometry.trigonometry import angle_of, sine_cosine
 from arm_ik_service.ik.conjugate import NEAREST, SOLVED, rotation_error
 from arm_ik_service.ik.swivel import beyond, from_above
@@ -119,45 +107,39 @@ def _turned(arm: Record, axis: Vector, upper_arm: Columns, turn: float) -> tuple
 
     Returns how far [rad], and the square of what is missed of the hand's rotation [rad^2].
     """
-    q, shown = arm.configuration, arm.shown
+    q = arm.configuration
     hand = turn_group(turn_group(upper_arm, q[4], q[5], q[6])[2], q[7], q[8], 0.0)[2]  # its axial play stays
-    missed = _take(arm, axis, upper_arm, hand, turn)
+    missed = _take(arm, axis, hand, turn)
     if missed < MOST_MISSED_RAD2:
         return turn, missed
     allowed, refused, least = 0.0, turn, 0.0
     for i in range(1, PARTS):
         tried = turn * (1.0 - i / PARTS)
-        missed = _take(arm, axis, upper_arm, hand, tried)
+        missed = _take(arm, axis, hand, tried)
         if missed < MOST_MISSED_RAD2:
             allowed, least = tried, missed
             break
         refused = tried
     for _ in range(HALVINGS):
         tried = 0.5 * (allowed + refused)
-        missed = _take(arm, axis, upper_arm, hand, tried)
+        missed = _take(arm, axis, hand, tried)
         if missed < MOST_MISSED_RAD2:
             allowed, least = tried, missed
         else:
             refused = tried
-    if allowed == 0.0:
-        for i in range(10):
-            shown[i] = q[i]
     return allowed, least
 
 
 @compiled
-def _take(arm: Record, axis: Vector, upper_arm: Columns, hand: Columns, turn: float) -> float:
+def _take(arm: Record, axis: Vector, hand: Columns, turn: float) -> float:
     """Turn the shown arm about the line, past its hand, unless the joints forbid it.
 
     Returns the square of what would be missed of the hand's rotation [rad^2]; infinity where the shoulder forbids it.
     """
     chain, q, shown = arm.chain, arm.configuration, arm.shown
-    s, c = sine_cosine(turn)
-    base = (
-        _rotated(axis, s, c, upper_arm[0]),
-        _rotated(axis, s, c, upper_arm[1]),
-        _rotated(axis, s, c, upper_arm[2]),
-    )
+    s, c = sine_cosine(0.5 * turn)
+    shoulder = multiply((s * axis[0], s * axis[1], s * axis[2], c), (q[0], q[1], q[2], q[3]))
+    base = columns_of(shoulder)
     if not _shoulder_allows(chain, base):
         return math.inf
     x, y, z = turn_group(base, q[4], q[5], 0.0)[2]
@@ -170,18 +152,12 @@ def _take(arm: Record, axis: Vector, upper_arm: Columns, hand: Columns, turn: fl
     missed = beyond(pronation, lower[2], upper[2]) + beyond(flexion, lower[3], upper[3])
     missed += beyond(deviation, lower[4], upper[4])
     if missed < MOST_MISSED_RAD2:
-        shoulder = from_columns(*base)
         for i in range(4):
             shown[i] = shoulder[i]
         shown[6] = clip(pronation, lower[2], upper[2])
         shown[7] = clip(flexion, lower[3], upper[3])
         shown[8] = clip(deviation, lower[4], upper[4])
     return missed
-
-
-@inlined
-def _rotated(axis: Vector, s: float, c: float, v: Vector) -> Vector:
-    return add(add(scale(c, v), scale(s, cross(axis, v))), scale((1.0 - c) * dot(axis, v), axis))
 
 
 @inlined

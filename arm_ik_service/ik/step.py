@@ -18,7 +18,7 @@ from arm_ik_service.arm.chain import (
 )
 from arm_ik_service.arm.configuration import difference, integrate, read_configuration, store_configuration
 from arm_ik_service.arm.limits import swing_excess, swing_surely_inside, twist_excess, twist_of
-from arm_ik_service.compiled import Record, compiled
+from arm_ik_service.compiled import Record, compiled, inlined
 from arm_ik_service.geometry.scalar import clip, quaternion, scale, store, vector
 from arm_ik_service.ik.calm import calm
 from arm_ik_service.ik.conjugate import SOLVED
@@ -49,6 +49,7 @@ def step_arm(arm: Record, target: Record, dt_s: float, settings: Record) -> None
     else:
         step_frame(arm, settings, position, rotation, dt_s)
     calm(arm, settings, rotation, dt_s)
+    _keep_sign(arm)
     linear = position_to_arm(chain, vector(target.linear_velocity))
     angular = spin_to_arm(chain, vector(target.angular_velocity))
     _move_on(arm, settings, linear, angular, dt_s)
@@ -59,6 +60,15 @@ def step_arm(arm: Record, target: Record, dt_s: float, settings: Record) -> None
     if arm.orientation_error_rad != arm.work.orientation_error_rad:  # turned less than it was solved
         found = hand_from_arm(chain, forward(chain, arm.configuration)[4])
     store(arm.hand_found, found)
+
+
+@inlined
+def _keep_sign(arm: Record) -> None:
+    """A quaternion and its negative are one rotation; whoever blends from frame to frame minds which it is."""
+    q, before = arm.shown, arm.before
+    if q[0] * before[0] + q[1] * before[1] + q[2] * before[2] + q[3] * before[3] < 0.0:
+        for i in range(4):
+            q[i] = -q[i]
 
 
 @compiled

@@ -52,6 +52,8 @@ def test_no_limit_is_exceeded_and_little_of_the_rotation_missed_for_the_elbows_s
     assert np.abs(RIGHT.excess(calm.configuration)).max() < 1e-9
     hands = [RIGHT.forward(answer.configuration)["hand"][:, 3:] for answer in (calm, solved)]
     missed = batch.angle_between(*hands)
+    shoulders = calm.configuration[:, :4]
+    assert (np.sum(shoulders[1:] * shoulders[:-1], axis=1) > 0.0).all()  # a quaternion that does not flip its sign
     assert missed.max() < 1.2 * np.sqrt(MOST_MISSED_RAD2)  # that is of three joints, which do not just add up
     assert np.median(missed) < 1e-6
 
