@@ -18,6 +18,7 @@ FADES_FOR_S = 0.4  # time constant of the way to rest ...
 FASTEST_M_S, FASTEST_RAD_S = 1.0, 3.0  # ... and its bounds
 
 NECK_TURNS_RAD = 0.6  # a glance within this leaves the body, and with it a held hand, where it is
+SWINGS_AT_M_S = 12.0  # at most: a dancer's spin would swing a hand that is held away faster than any hand
 BODY_FOLLOWS_S = 1.5  # nobody looks aside for ever: time constant with which the body comes after the head
 
 
@@ -60,9 +61,11 @@ def _approach_rotation(device: Record, goal: Quaternion, elapsed_s: float) -> No
 
 
 @compiled
-def _carry_position(hand: Record, head_before: Vector, head: Vector, turn: Quaternion) -> None:
-    away = g.rotate(turn, g.subtract(g.vector(hand.position), head_before))
-    g.store(hand.position, g.add(head, away))
+def _carry_position(hand: Record, head_before: Vector, head: Vector, turn: Quaternion, elapsed_s: float) -> None:
+    away = g.subtract(g.vector(hand.position), head_before)
+    swing = g.subtract(g.rotate(turn, away), away)
+    share = min(SWINGS_AT_M_S * elapsed_s / max(g.norm(swing), 1e-9), 1.0)
+    g.store(hand.position, g.add(head, g.add(away, g.scale(share, swing))))
 
 
 @compiled
@@ -77,7 +80,7 @@ def place_hand_without_data(
     if hand.position_age_s >= NEVER_S:
         g.store(hand.position, rest)
     elif hand.position_age_s > 0.0:
-        _carry_position(hand, head_before, head, turn)
+        _carry_position(hand, head_before, head, turn, elapsed_s)
         if fades and hand.position_state == LOST:
             _approach_position(hand, rest, elapsed_s)
     if hand.rotation_age_s >= NEVER_S:

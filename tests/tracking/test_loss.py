@@ -133,3 +133,12 @@ def test_a_hand_that_is_held_goes_round_with_a_person_who_turns_but_not_with_a_g
 
     assert yaw_of_hand(0.5) < 0.25
     assert yaw_of_hand(3.0) == pytest.approx(2.6, abs=0.3)
+
+
+def test_a_hand_that_is_held_is_not_swung_faster_than_a_hand_goes() -> None:
+    take = standing(2.0).flagged(LEFT, slice(45, None), 0).moved(LEFT, np.tile([-0.6, 0.0, -0.3], (180, 1)))
+    spins = np.maximum(take.t - 0.7, 0.0)[:, None] * np.array([0.0, 25.0, 0.0])
+    made = run(take.turned(HEAD, batch.exp(spins)).frames)
+    hand = made.position(LEFT) - made.position(HEAD)
+    fastest = speeds(take.t, hand)[50:].max()
+    assert 9.0 < fastest < 12.1
