@@ -20,6 +20,7 @@ import zenoh
 from arm_ik_service.errors import WireError
 from arm_ik_service.io.jitter_buffer import JitterBuffer, Pace
 from arm_ik_service.io.zenoh_threads import keep_thread_state
+from arm_ik_service.settings import ServiceSettings
 from arm_ik_service.wire.keys import Keys, check_id
 
 _WAKE = ""  # no avatar's id
@@ -34,18 +35,6 @@ class Arrival:
     payload: bytes | None  # None: given up before it was taken
     receive_time_ns: int
     overtaken: int  # how many frames this one replaced
-
-
-@dataclass(frozen=True)
-class InboxLimits:
-    """What is taken in at all."""
-
-    max_message_bytes: int
-    max_id_length: int
-    max_avatars: int
-    max_frames_per_s: float
-    rate_burst_s: float
-    jitter_buffer_s: float = 0.0
 
 
 @dataclass(slots=True)
@@ -74,7 +63,7 @@ class Inbox:
         self,
         session: zenoh.Session,
         keys: Keys,
-        limits: InboxLimits,
+        limits: ServiceSettings,
         owns: Callable[[str], bool],
         answer_now: Callable[[Arrival], bool] | None = None,
     ) -> None:

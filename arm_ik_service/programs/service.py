@@ -17,7 +17,7 @@ from threading import Lock
 from arm_ik_service.avatar import Avatars
 from arm_ik_service.body.profile import Profile
 from arm_ik_service.errors import DecodeError, ModelError, ProfileError, VersionError, WireError
-from arm_ik_service.io.zenoh_inbox import Arrival, Inbox, InboxLimits
+from arm_ik_service.io.zenoh_inbox import Arrival, Inbox
 from arm_ik_service.io.zenoh_streams import Bus, answer_queries, declare_stream, put_once, subscribe
 from arm_ik_service.programs.fleet import Fleet
 from arm_ik_service.programs.look_out import LookOut, profiles
@@ -76,20 +76,7 @@ class Service:
         self._rehearsal = Rehearsal(settings, profile) if avatars is None and limits.rehearse_every_s else None
         self._back_to_back = 0
         self._fleet = Fleet(session, self._keys, name, self._note_change)
-        self._inbox = Inbox(
-            session,
-            self._keys,
-            InboxLimits(
-                max_message_bytes=limits.max_message_bytes,
-                max_id_length=limits.max_id_length,
-                max_avatars=limits.max_avatars,
-                max_frames_per_s=limits.max_frames_per_s,
-                rate_burst_s=limits.rate_burst_s,
-                jitter_buffer_s=limits.jitter_buffer_s,
-            ),
-            self._fleet.owns,
-            self._answer_now,
-        )
+        self._inbox = Inbox(session, self._keys, limits, self._fleet.owns, self._answer_now)
         self._onlookers = Onlookers(session, self._keys, limits.encoding, self._inbox.wake)
         self._look_out = LookOut(session, self._keys, limits, self._inbox, self._seats.__contains__)
         self._health = declare_stream(session, self._keys.health(name), limits.encoding)

@@ -12,9 +12,10 @@ from harness import KEYS, standing, wait_for
 
 from arm_ik_service.io.jitter_buffer import MOST_HELD, JitterBuffer, Pace
 from arm_ik_service.io.zenoh_bus import BusOptions, open_client, open_hub
-from arm_ik_service.io.zenoh_inbox import Arrival, Inbox, InboxLimits
+from arm_ik_service.io.zenoh_inbox import Arrival, Inbox
 from arm_ik_service.io.zenoh_streams import declare_stream
 from arm_ik_service.programs.demo import free_endpoint
+from arm_ik_service.settings import ServiceSettings
 from arm_ik_service.wire import codec
 
 Times = npt.NDArray[np.int64]
@@ -91,7 +92,7 @@ def test_what_cannot_be_read_is_passed_on_for_the_service_to_count() -> None:
 
 def arrivals(jitter_buffer_s: float, count: int = 60) -> list[int]:
     """Receive times [ns] of frames that a sender of 90 Hz puts on a real bus five at a time."""
-    limits = InboxLimits(4096, 64, 4, 1000.0, 2.0, jitter_buffer_s)
+    limits = ServiceSettings(max_avatars=4, jitter_buffer_s=jitter_buffer_s)
     received: list[int] = []
     endpoint = free_endpoint()
 
