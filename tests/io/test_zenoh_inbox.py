@@ -13,6 +13,7 @@ from arm_ik_service.io.zenoh_bus import BusOptions, open_client, open_hub
 from arm_ik_service.io.zenoh_inbox import Arrival, Inbox
 from arm_ik_service.io.zenoh_streams import Bus, put_once
 from arm_ik_service.programs.demo import free_endpoint
+from arm_ik_service.settings import ServiceSettings
 
 LIMITS = ServiceSettings(
     max_message_bytes=100, max_id_length=8, max_avatars=2, max_frames_per_s=100.0, rate_burst_s=0.2
