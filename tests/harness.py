@@ -31,6 +31,12 @@ def wait_for(condition: Callable[[], bool], seconds: float = 10.0) -> bool:
     return True
 
 
+def may_idle() -> bool:
+    """Return whether processes here may ask to run only where nobody else wants to."""
+    ask = "import os; os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))"
+    return subprocess.run([sys.executable, "-c", ask], capture_output=True, check=False).returncode == 0
+
+
 class Running:
     """`arm-ik ...` as a process; its standard error is kept, line by line."""
 

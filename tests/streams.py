@@ -48,6 +48,15 @@ def random_stream(
     return q, arm.forward(q)["hand"]
 
 
+def tumbling(seed: int, frames: int = 1500, rate_hz: float = 90.0) -> Array:
+    """Hands (frames, 7) that stay before the right shoulder and turn every way, most of the time out of range."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(frames)[:, None] / rate_hz
+    waves = [rng.normal(size=3) * np.sin(2 * np.pi * f * t + rng.uniform(0, 6, 3)) for f in (0.3, 0.7, 1.5, 2.2)]
+    sway = 0.05 * np.sin(2 * np.pi * np.array([0.5, 0.7, 0.9]) * t)
+    return np.concatenate([np.array([0.1, -0.25, -0.35]) + sway, batch.exp(1.2 * np.sum(waves, axis=0))], axis=1)
+
+
 @dataclass
 class Run:
     """What step_arm answered, frame by frame."""

@@ -107,7 +107,7 @@ class Line:
 
 
 def take_turns(lines: list[Line], rate_hz: float, frames: int, progress: Callable[[int], None] | None = None) -> None:
-    """Send `frames` on every line at `rate_hz`, the lines evenly shifted, so that noise falls on all of them alike.
+    """Send `frames` on every line, one a period of `rate_hz`, in evenly spaced slots: noise falls on all of them alike.
 
     In every period their order is drawn anew: whoever always came second would always find the processors awake, and
     in their caches what the first one's onlookers do.

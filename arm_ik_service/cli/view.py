@@ -69,8 +69,8 @@ def view(
         sinks.append(Spawn())
     if record is not None and record.exists():
         raise SessionError(f"{record} exists: choose another name")
-    skin, overlays = skin_options(avatar, skinning), show_option(show)
     give_way(entirely=record is None and all(isinstance(sink, Save) for sink in sinks))
+    skin, overlays = skin_options(avatar, skinning), show_option(show)
     with open_client(zenoh, waiting=say) as bus, recorded_beside(bus, record, Keys(prefix)) as recorded:
         viewer = Viewer(bus, sinks, Keys(prefix), skin, overlays)
         for sink in sinks:

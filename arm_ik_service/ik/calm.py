@@ -17,7 +17,20 @@ import math
 from arm_ik_service.arm.chain import Columns, columns_of, turn_group, wrist_at
 from arm_ik_service.arm.limits import swing_excess, swing_surely_inside, twist_excess, twist_of
 from arm_ik_service.compiled import Record, compiled, inlined
-from arm_ik_service.geometry.scalar import Vector, add, clip, cross, dot, multiply, norm, scale, store, subtract, vector
+from arm_ik_service.geometry.scalar import (
+    Vector,
+    add,
+    clip,
+    cross,
+    dot,
+    multiply,
+    norm,
+    scale,
+    store,
+    subtract,
+    vector,
+    wrap,
+)
 from arm_ik_service.geometry.trigonometry import angle_of, sine_cosine
 from arm_ik_service.ik.conjugate import NEAREST, SOLVED, rotation_error
 from arm_ik_service.ik.swivel import beyond, from_above
@@ -26,6 +39,7 @@ LONGEST_S = 0.2  # that an elbow takes while the hand rests
 MOST_M_S2 = 30.0  # acceleration of an elbow about the line
 SMALLEST_LEVER_M = 0.02  # of the elbow about the line, for that: nobody sees a straight arm turn
 FASTEST_RAD_S = 20.0  # about the line; what is faster is a leap, which leaves no swing behind
+STEP_M = 0.02  # of an elbow in a frame that may be made for the wrist's sake alone
 LARGEST_RAD = 0.3  # by which an elbow comes after the solve's: from farther away there may be no way
 MOST_MISSED_RAD2 = 0.12**2  # of the hand's rotation, squared, for the elbow's sake
 UNSEEN_RAD = 1e-5  # a turn that is not worth the work
@@ -48,7 +62,7 @@ def calm(arm: Record, settings: Record, rotation: Columns, dt_s: float) -> None:
         arm.calm_started, arm.calm_turn, arm.calm_speed = 1, 0.0, 0.0
     else:
         came_from = _transported(vector(arm.calm_side), vector(arm.calm_axis), axis)
-        to_go = angle_of(dot(cross(came_from, side), axis), dot(came_from, side)) - arm.calm_turn
+        to_go = wrap(angle_of(dot(cross(came_from, side), axis), dot(came_from, side)) - arm.calm_turn)
         along = dot(upper_arm[1], axis)
         lever_m = chain.upper_arm_m * math.sqrt(max(1.0 - along * along, 0.0))
         speed_m_s = norm(subtract(wrist, vector(arm.calm_wrist))) / dt_s
@@ -56,10 +70,10 @@ def calm(arm: Record, settings: Record, rotation: Columns, dt_s: float) -> None:
         wanted = _follow(arm, to_go, time_s, MOST_M_S2 / max(lever_m, SMALLEST_LEVER_M), dt_s) - to_go
         turn, missed = clip(wanted, -LARGEST_RAD, LARGEST_RAD), 0.0
         if abs(turn) > UNSEEN_RAD:
-            turn, missed = _turned(arm, axis, upper_arm, turn)
-        if turn == wanted:
-            arm.restarted = 0  # who looks on sees no leap
-        else:
+            # where the wrist has it come nearer, it comes no faster than the solve's elbow goes, or a little
+            most = max(abs(to_go + arm.calm_turn), abs(to_go + turn), STEP_M / max(lever_m, SMALLEST_LEVER_M))
+            turn, missed = _turned(arm, axis, upper_arm, turn, clip(to_go, -most, most) - to_go)
+        if turn != wanted:
             speed = (to_go + turn) / dt_s
             arm.calm_speed = speed if abs(speed) < FASTEST_RAD_S else 0.0
         arm.calm_turn = turn
@@ -102,27 +116,24 @@ def _follow(arm: Record, to_go: float, time_s: float, most: float, dt_s: float) 
 
 
 @compiled
-def _turned(arm: Record, axis: Vector, upper_arm: Columns, turn: float) -> tuple[float, float]:
-    """Turn the shown arm about the line, past its hand, as far as its joints allow.
+def _turned(arm: Record, axis: Vector, upper_arm: Columns, turn: float, nearer: float) -> tuple[float, float]:
+    """Turn the shown arm about the line, past its hand, or as much less, down to `nearer`, as its wrist wants it.
 
-    Returns how far [rad], and the square of what is missed of the hand's rotation [rad^2].
+    The shoulder has its way in any case. Returns how far [rad], and the square of what is missed of the hand's
+    rotation [rad^2].
     """
     q = arm.configuration
     hand = turn_group(turn_group(upper_arm, q[4], q[5], q[6])[2], q[7], q[8], 0.0)[2]  # its axial play stays
-    missed = _take(arm, axis, hand, turn)
+    missed = _take(arm, axis, hand, turn, MOST_MISSED_RAD2)
     if missed < MOST_MISSED_RAD2:
         return turn, missed
-    allowed, refused, least = 0.0, turn, 0.0
-    for i in range(1, PARTS):
-        tried = turn * (1.0 - i / PARTS)
-        missed = _take(arm, axis, hand, tried)
-        if missed < MOST_MISSED_RAD2:
-            allowed, least = tried, missed
-            break
-        refused = tried
+    allowed, least, refused = _first_allowed(arm, axis, hand, turn, nearer, MOST_MISSED_RAD2)
+    if least == math.inf:
+        allowed, least, refused = _first_allowed(arm, axis, hand, nearer, 0.0, math.inf)
+        return allowed, least
     for _ in range(HALVINGS):
         tried = 0.5 * (allowed + refused)
-        missed = _take(arm, axis, hand, tried)
+        missed = _take(arm, axis, hand, tried, MOST_MISSED_RAD2)
         if missed < MOST_MISSED_RAD2:
             allowed, least = tried, missed
         else:
@@ -131,10 +142,28 @@ def _turned(arm: Record, axis: Vector, upper_arm: Columns, turn: float) -> tuple
 
 
 @compiled
-def _take(arm: Record, axis: Vector, hand: Columns, turn: float) -> float:
-    """Turn the shown arm about the line, past its hand, unless the joints forbid it.
+def _first_allowed(
+    arm: Record, axis: Vector, hand: Columns, start: float, end: float, most_missed: float
+) -> tuple[float, float, float]:
+    """Take the first turn from `start` to `end` that is allowed; returns it, what it misses, and the one before it.
 
-    Returns the square of what would be missed of the hand's rotation [rad^2]; infinity where the shoulder forbids it.
+    Where none is, what is missed is infinite; at 0 nothing is.
+    """
+    refused = start
+    for i in range(PARTS + 1):
+        tried = start + (end - start) * (i / PARTS)
+        missed = _take(arm, axis, hand, tried, most_missed)
+        if missed < most_missed:
+            return tried, missed, refused
+        refused = tried
+    return 0.0, math.inf, refused
+
+
+@compiled
+def _take(arm: Record, axis: Vector, hand: Columns, turn: float, most_missed: float) -> float:
+    """Turn the shown arm about the line, past its hand, unless that misses too much of the hand's rotation [rad^2].
+
+    Returns the square of what it misses or would miss; infinity where the shoulder forbids it.
     """
     chain, q, shown = arm.chain, arm.configuration, arm.shown
     s, c = sine_cosine(0.5 * turn)
@@ -151,7 +180,7 @@ def _take(arm: Record, axis: Vector, hand: Columns, turn: float) -> float:
     lower, upper = chain.lower, chain.upper
     missed = beyond(pronation, lower[2], upper[2]) + beyond(flexion, lower[3], upper[3])
     missed += beyond(deviation, lower[4], upper[4])
-    if missed < MOST_MISSED_RAD2:
+    if missed < most_missed:
         for i in range(4):
             shown[i] = shoulder[i]
         shown[6] = clip(pronation, lower[2], upper[2])

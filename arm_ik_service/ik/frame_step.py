@@ -25,7 +25,7 @@ from arm_ik_service.arm.configuration import integrate, read_configuration, stor
 from arm_ik_service.arm.tangent import Tangent
 from arm_ik_service.compiled import Record, compiled, inlined
 from arm_ik_service.geometry.scalar import Vector, clip, components, norm, scale, store, subtract
-from arm_ik_service.geometry.trigonometry import angle_of
+from arm_ik_service.geometry.trigonometry import angle_of, sine_cosine
 from arm_ik_service.ik.any_rotation import POSITION_ALONE, STUCK_M, deadline_of, reach_with_any_rotation
 from arm_ik_service.ik.comfort import discomfort, learn_habit
 from arm_ik_service.ik.conjugate import NEAREST, OUT_OF_TIME, SOLVED, converge
@@ -281,10 +281,11 @@ def carry_on(arm: Record, towards_comfort: Tangent, dt_s: float) -> None:
 @inlined
 def bend(arm: Record, reach: Reach) -> None:
     """Flex the elbow as far as the target's distance says, given the carrying angle, which bends the arm too."""
-    q, bent = arm.configuration, angle_of(reach[3], reach[4])
-    q[5] = clip(q[5], -CARRIED * bent, CARRIED * bent)
-    cosine = reach[4] / math.cos(q[5])
-    q[4] = min(angle_of(math.sqrt(max(1.0 - cosine * cosine, 0.0)), cosine), arm.chain.upper[0])
+    q, lower, upper = arm.configuration, arm.chain.lower, arm.chain.upper
+    most = CARRIED * angle_of(reach[3], reach[4])
+    q[5] = clip(clip(q[5], -most, most), lower[1], upper[1])
+    cosine = min(reach[4] / sine_cosine(q[5])[1], 1.0)
+    q[4] = clip(angle_of(math.sqrt(1.0 - cosine * cosine), cosine), lower[0], upper[0])
 
 
 @compiled

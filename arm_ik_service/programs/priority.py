@@ -9,7 +9,9 @@ NICENESS = 10  # halfway to the least
 
 
 def give_way(*, entirely: bool = False) -> None:
-    """Lower the priority of this process and of those it starts, where the system knows such a thing.
+    """Lower the priority of this thread, and of threads and processes that it starts from now on.
+
+    Where the system knows such a thing. To be called before anything that works.
 
     `entirely` is for what nobody waits for, such as a file: it runs where nobody else wants to, and ends its turn at
     once for whoever does. A merely nice process keeps its for some milliseconds (measured on two cores, a view that

@@ -61,11 +61,16 @@ def _approach_rotation(device: Record, goal: Quaternion, elapsed_s: float) -> No
 
 
 @compiled
-def _carry_position(hand: Record, head_before: Vector, head: Vector, turn: Quaternion, elapsed_s: float) -> None:
-    away = g.subtract(g.vector(hand.position), head_before)
-    swing = g.subtract(g.rotate(turn, away), away)
-    share = min(SWINGS_AT_M_S * elapsed_s / max(g.norm(swing), 1e-9), 1.0)
-    g.store(hand.position, g.add(head, g.add(away, g.scale(share, swing))))
+def _swing(hand: Record, away: Vector, turned: float, elapsed_s: float) -> float:
+    """How far a held hand goes round with a person who `turned` [rad]; what is too fast it makes up for later."""
+    if hand.position_age_s == 0.0:
+        hand.turn_left = 0.0
+        return turned
+    most = SWINGS_AT_M_S * elapsed_s / max(math.sqrt(away[0] * away[0] + away[2] * away[2]), 1e-9)
+    wanted = hand.turn_left + turned
+    swing = g.clip(wanted, -most, most)
+    hand.turn_left = g.wrap(wanted - swing)
+    return float(swing)
 
 
 @compiled
@@ -74,13 +79,14 @@ def place_hand_without_data(
 ) -> None:
     """Move what is not followed of one hand after a person whose head was at `head_before` and who `turned` [rad]."""
     hand, head = tracking.hands[k], g.vector(tracking.head.position)
-    turn, upright = g.rotation_y(turned), g.rotation_y(tracking.heading)
+    away = g.subtract(g.vector(hand.position), head_before)
+    turn, upright = g.rotation_y(_swing(hand, away, turned, elapsed_s)), g.rotation_y(tracking.heading)
     rest = g.add(head, g.rotate(upright, HANDS_AT_REST[k]))
     fades = dead_reckoning == FADE_TO_REST
     if hand.position_age_s >= NEVER_S:
         g.store(hand.position, rest)
     elif hand.position_age_s > 0.0:
-        _carry_position(hand, head_before, head, turn, elapsed_s)
+        g.store(hand.position, g.add(head, g.rotate(turn, away)))
         if fades and hand.position_state == LOST:
             _approach_position(hand, rest, elapsed_s)
     if hand.rotation_age_s >= NEVER_S:

@@ -50,6 +50,7 @@ DEVICE = record_dtype(
         ("rotation_state", np.int64),
         ("position_age_s", np.float64),  # since the last position that was followed
         ("rotation_age_s", np.float64),
+        ("turn_left", np.float64),  # [rad] that a held hand is behind the person it goes round with
         ("glitches", np.int64),  # samples not followed because no hand moves like that
         ("position_channel", _channel(3)),
         ("rotation_channel", _channel(4)),

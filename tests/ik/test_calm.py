@@ -5,12 +5,13 @@ from __future__ import annotations
 import msgspec
 import numpy as np
 import pytest
-from streams import Array, Run, random_stream, run, targets_of
+from streams import Array, Run, random_stream, run, targets_of, tumbling
 
 from arm_ik_service.arm.model import ArmModel
 from arm_ik_service.body.report import jerk_rms
 from arm_ik_service.geometry import batch
 from arm_ik_service.ik.calm import LARGEST_RAD, LONGEST_S, MOST_MISSED_RAD2
+from arm_ik_service.ik.pace import ELBOW_STEP_M
 from arm_ik_service.ik.state import new_arm
 from arm_ik_service.ik.step import step_arm
 from arm_ik_service.settings import SolverSettings, to_record
@@ -54,7 +55,9 @@ def test_no_limit_is_exceeded_and_little_of_the_rotation_missed_for_the_elbows_s
     missed = batch.angle_between(*hands)
     shoulders = calm.configuration[:, :4]
     assert (np.sum(shoulders[1:] * shoulders[:-1], axis=1) > 0.0).all()  # a quaternion that does not flip its sign
-    assert missed.max() < 1.2 * np.sqrt(MOST_MISSED_RAD2)  # that is of three joints, which do not just add up
+    most = 1.2 * np.sqrt(MOST_MISSED_RAD2)  # the root is of three joints, which do not just add up
+    assert np.percentile(missed, 99) < most
+    assert missed.max() < 2.0 * most  # where the elbow would have to leap for more
     assert np.median(missed) < 1e-6
 
 
@@ -70,6 +73,16 @@ def test_the_elbow_is_never_far_from_the_solves() -> None:
         calm, solved = both(hands)
         apart = np.linalg.norm(calm.elbow - solved.elbow, axis=1)
         assert 0.0 < apart.max() < LARGEST_RAD * float(RIGHT.chains[0]["upper_arm_m"])
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_what_no_arm_can_follow_does_not_throw_the_elbow_about(seed: int) -> None:
+    hands = tumbling(seed)
+    calm, solved = both(hands)
+    hand_steps = np.linalg.norm(np.diff(hands[1:-1, :3], axis=0), axis=1)
+    assert np.max(np.linalg.norm(np.diff(calm.elbow, axis=0), axis=1) - hand_steps) < 2.0 * ELBOW_STEP_M
+    t = np.asarray(np.arange(len(hands) - 2) * DT_S, np.float64)
+    assert jerk_rms(t, calm.elbow) < jerk_rms(t, solved.elbow)
 
 
 def test_an_elbow_comes_to_the_solves_when_the_hand_rests() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from streams import tumbling
 
 from arm_ik_service.arm.model import ArmModel
 from arm_ik_service.geometry import batch
@@ -11,17 +12,8 @@ from arm_ik_service.ik.any_rotation import STUCK_M
 from arm_ik_service.ik.jacobian_transpose import JacobianTranspose
 from arm_ik_service.ik.pace import CATCH_UP_M_S, ELBOW_STEP_M
 
-FRAMES, RATE_HZ = 1500, 90.0
+FRAMES, RATE_HZ = 1500, 90.0  # as tumbling's
 CARRY_M = 0.015  # of the elbow on its circle, as the reach changes from frame to frame
-
-
-def tumbling(seed: int) -> batch.Array:
-    """Hands (FRAMES, 7) that stay before the right shoulder and turn every way, most of the time out of range."""
-    rng = np.random.default_rng(seed)
-    t = np.arange(FRAMES)[:, None] / RATE_HZ
-    waves = [rng.normal(size=3) * np.sin(2 * np.pi * f * t + rng.uniform(0, 6, 3)) for f in (0.3, 0.7, 1.5, 2.2)]
-    sway = 0.05 * np.sin(2 * np.pi * np.array([0.5, 0.7, 0.9]) * t)
-    return np.concatenate([np.array([0.1, -0.25, -0.35]) + sway, batch.exp(1.2 * np.sum(waves, axis=0))], axis=1)
 
 
 @pytest.mark.parametrize("seed", range(5))

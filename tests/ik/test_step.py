@@ -180,3 +180,13 @@ def test_it_runs_as_plain_python_too_and_answers_the_same() -> None:
         )
         outputs.append(np.array(eval(done.stdout)))
     np.testing.assert_allclose(outputs[0], outputs[1], atol=1e-9)
+
+
+def test_a_nearly_straight_arm_keeps_a_carrying_angle_that_leaves_out_zero() -> None:
+    arm = ArmModel.load(limits={"elbow_carrying": (-0.26, -0.09)})
+    straight = arm.rest.copy()
+    straight[4], straight[5] = 0.1, -0.09
+    hands = np.tile(arm.forward(straight[None])["hand"][0], (60, 1))
+    hands[:, 1] += np.linspace(0.0, 0.02, 60)
+    answer = run(arm, targets_of(hands, DT_S), DT_S)
+    assert np.abs(arm.excess(answer.configuration)).max() < 1e-9

@@ -142,3 +142,16 @@ def test_a_hand_that_is_held_is_not_swung_faster_than_a_hand_goes() -> None:
     hand = made.position(LEFT) - made.position(HEAD)
     fastest = speeds(take.t, hand)[50:].max()
     assert 9.0 < fastest < 12.1
+    reach = np.linalg.norm(hand[45:, [0, 2]], axis=1)
+    assert np.ptp(reach) < 1e-9
+
+
+def test_a_hand_that_is_held_comes_after_a_turn_that_was_too_fast_for_it() -> None:
+    take = standing(2.0).flagged(LEFT, slice(45, None), 0).moved(LEFT, np.tile([-0.6, 0.0, -0.3], (180, 1)))
+    turns = np.minimum(np.maximum(take.t - 0.7, 0.0) * 25.0, 2.5)[:, None] * np.array([0.0, 1.0, 0.0])
+    made = run(take.turned(HEAD, batch.exp(turns)).frames)
+    before, after = (made.position(LEFT) - made.position(HEAD))[[44, -1]]
+    turned = np.arctan2(after[0], after[2]) - np.arctan2(before[0], before[2])
+    heading = made.tracking["heading"]
+    assert turned % (2 * np.pi) == pytest.approx((heading[-1] - heading[44]) % (2 * np.pi), abs=0.02)
+    assert batch.angle_between(made.device(LEFT)["rotation"][-1], batch.exp([0.0, turned, 0.0])) < 0.02
