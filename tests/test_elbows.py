@@ -13,8 +13,8 @@ from arm_ik_service.body.report import jerk_rms
 from arm_ik_service.io.session import open_session
 
 # What is wanted is 1.2; half of all elbows are below 1.1, most of the others below 1.35. Known to be over it: an elbow
-# that leaps once because none lets the hand be where the chest, which is wrongly turned there, has it; hands at the ends
-# of their wrists' ranges; and recordings smoother than a filter leaves what a headset would have given.
+# that leaps once because none lets the hand be where the chest, which is wrongly turned there, has it; hands at the
+# ends of their wrists' ranges; and recordings smoother than a filter leaves what a headset would have given.
 JERK_AT_MOST = 1.35  # of either side
 JERK_KNOWN = {
     "cmu_salsa_60_01": 12.0,  # or leaps there and back: which of the two hangs on a hair
