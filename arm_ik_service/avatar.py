@@ -150,7 +150,6 @@ class Avatars:
                 return False
         for arm, q in zip(row.arms, configurations, strict=True):
             arm["configuration"] = q
-            arm["before"] = q
             arm["shown"] = q
             arm["started"] = 1  # not a first frame: it would choose the elbow afresh
         left, right = state.left.bones, state.right.bones

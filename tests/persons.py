@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from arm_ik_service.body.profile import Profile
+from arm_ik_service.body.profile import BodyMeasures, Profile
 from arm_ik_service.body.state import BODY
 from arm_ik_service.body.step import initialise_body, step_body
 from arm_ik_service.compiled import compiled
@@ -24,6 +25,20 @@ Records = np.ndarray[Any, Any]
 
 HEAD, LEFT, RIGHT = 0, 1, 2
 MS = 1_000_000
+
+
+def distance_m(truth: Mapping[str, Array], a: str, b: str) -> float:
+    """Median distance [m] between two joints of a motion capture."""
+    return float(np.median(np.linalg.norm(truth[a] - truth[b], axis=1)))
+
+
+def measures_of(truth: Mapping[str, Array]) -> BodyMeasures:
+    """What a motion capture says of its person's bones."""
+    return BodyMeasures(
+        upper_arm_m=distance_m(truth, "left_shoulder", "left_elbow"),
+        forearm_m=distance_m(truth, "left_elbow", "left_wrist"),
+        shoulder_width_m=distance_m(truth, "left_shoulder", "right_shoulder"),
+    )
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,10 @@ from collections import defaultdict
 from pathlib import Path
 
 import numpy as np
+from persons import measures_of
 
 from arm_ik_service.avatar import Avatar
-from arm_ik_service.body.profile import BodyMeasures, Profile
+from arm_ik_service.body.profile import Profile
 from arm_ik_service.body.report import jerk_rms
 from arm_ik_service.io.session import open_session
 
@@ -32,15 +33,7 @@ def test_elbows_are_near_the_recorded_ones_and_hardly_less_calm(recordings: Path
         with np.load(path) as archive:
             truth = {name: archive[name] for name in archive.files}
 
-        def length(a: str, b: str, truth: dict[str, np.ndarray] = truth) -> float:
-            return float(np.median(np.linalg.norm(truth[a] - truth[b], axis=1)))
-
-        measures = BodyMeasures(
-            upper_arm_m=length("left_shoulder", "left_elbow"),
-            forearm_m=length("left_elbow", "left_wrist"),
-            shoulder_width_m=length("left_shoulder", "right_shoulder"),
-        )
-        avatar = Avatar(Profile(body=measures))
+        avatar = Avatar(Profile(body=measures_of(truth)))
         frames = [recorded.frame for recorded in open_session(path).frames()]
         states = [avatar.step(frame, frame.sample_time_ns) for frame in frames]
         for side in ("left", "right"):

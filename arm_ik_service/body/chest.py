@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import math
 
-from arm_ik_service.body.follow import follow, followed_rate, predicted_follow, settled_time, start_at
+from arm_ik_service.body.follow import follow, predicted_follow, settled_time, start_at
 from arm_ik_service.body.state import ARM_LENGTH_OF_FIT
 from arm_ik_service.compiled import Record, compiled
 from arm_ik_service.geometry import scalar as g
+from arm_ik_service.geometry.follower import followed_rate
 from arm_ik_service.geometry.scalar import Quaternion, Vector
 
 NECK_PIVOT_IN_HEAD: Vector = (0.0, -0.165, 0.13)  # what the head turns on [m], in OpenXR VIEW axes (fit)

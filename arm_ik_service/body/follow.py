@@ -15,6 +15,7 @@ import math
 
 from arm_ik_service.compiled import Record, compiled
 from arm_ik_service.geometry import scalar as g
+from arm_ik_service.geometry.follower import followed_rate
 from arm_ik_service.geometry.scalar import Vector
 
 
@@ -22,16 +23,6 @@ from arm_ik_service.geometry.scalar import Vector
 def settled_time(time_s: float, since_s: float) -> float:
     """Time constant of a follower that started `since_s` ago: it takes up the motion that it finds, without a jolt."""
     return max(min(time_s, since_s), 1e-6)
-
-
-@compiled
-def followed_rate(rate: float, away: float, trails_s: float, elapsed_s: float) -> float:
-    """Rate of a critically damped follower that is `away` from its goal and trails a steady motion by `trails_s`.
-
-    Implicit in time: it blows up at no length of a frame.
-    """
-    stiff = 2.0 * elapsed_s / trails_s
-    return (rate + stiff * stiff / elapsed_s * away) / (1.0 + 2.0 * stiff + stiff * stiff)
 
 
 @compiled

@@ -17,14 +17,16 @@ import math
 from arm_ik_service.arm.chain import Columns, columns_of, turn_group, wrist_at
 from arm_ik_service.arm.limits import swing_excess, swing_surely_inside, twist_excess, twist_of
 from arm_ik_service.compiled import Record, compiled, inlined
+from arm_ik_service.geometry.follower import followed_rate
 from arm_ik_service.geometry.scalar import (
     Vector,
-    add,
+    between,
     clip,
     cross,
     dot,
     multiply,
     norm,
+    rotate,
     scale,
     store,
     subtract,
@@ -33,7 +35,7 @@ from arm_ik_service.geometry.scalar import (
 )
 from arm_ik_service.geometry.trigonometry import angle_of, sine_cosine
 from arm_ik_service.ik.conjugate import NEAREST, SOLVED, rotation_error
-from arm_ik_service.ik.swivel import beyond, from_above
+from arm_ik_service.ik.swivel import beyond, elbow_side, hand_angles
 
 LONGEST_S = 0.2  # that an elbow takes while the hand rests
 MOST_M_S2 = 30.0  # acceleration of an elbow about the line
@@ -57,11 +59,11 @@ def calm(arm: Record, settings: Record, rotation: Columns, dt_s: float) -> None:
     wrist, upper_arm = wrist_at(chain, q), columns_of((q[0], q[1], q[2], q[3]))
     distance = norm(wrist)
     axis = scale(1.0 / distance, wrist) if distance > 1e-9 else (0.0, -1.0, 0.0)
-    side = _side_of(axis, upper_arm)
+    side = elbow_side(axis, upper_arm)
     if arm.calm_started == 0:
         arm.calm_started, arm.calm_turn, arm.calm_speed = 1, 0.0, 0.0
     else:
-        came_from = _transported(vector(arm.calm_side), vector(arm.calm_axis), axis)
+        came_from = rotate(between(vector(arm.calm_axis), axis), vector(arm.calm_side))
         to_go = wrap(angle_of(dot(cross(came_from, side), axis), dot(came_from, side)) - arm.calm_turn)
         along = dot(upper_arm[1], axis)
         lever_m = chain.upper_arm_m * math.sqrt(max(1.0 - along * along, 0.0))
@@ -85,26 +87,9 @@ def calm(arm: Record, settings: Record, rotation: Columns, dt_s: float) -> None:
 
 
 @inlined
-def _side_of(axis: Vector, upper_arm: Columns) -> Vector:
-    side = cross(axis, upper_arm[2])
-    length = norm(side)
-    return scale(1.0 / length, side) if length > 1e-9 else upper_arm[0]
-
-
-@inlined
-def _transported(side: Vector, before: Vector, axis: Vector) -> Vector:
-    """Take a direction square to the line `before` along to `axis`, by the smallest turn there is."""
-    c, w = dot(before, axis), cross(before, axis)
-    if c < -0.99:
-        return side
-    return add(add(scale(c, side), cross(w, side)), scale(dot(w, side) / (1.0 + c), w))
-
-
-@inlined
 def _follow(arm: Record, to_go: float, time_s: float, most: float, dt_s: float) -> float:
     """Step [rad] of a critically damped follower whose acceleration is bounded [rad/s^2]."""
-    stiff = 2.0 * dt_s / max(time_s, 1e-6)
-    speed = (arm.calm_speed + stiff * stiff / dt_s * to_go) / (1.0 + 2.0 * stiff + stiff * stiff)
+    speed = followed_rate(arm.calm_speed, to_go, max(time_s, 1e-6), dt_s)
     gain = most * dt_s
     slowest, fastest = arm.calm_speed - gain, arm.calm_speed + gain
     speed = clip(speed, slowest, fastest)
@@ -171,12 +156,7 @@ def _take(arm: Record, axis: Vector, hand: Columns, turn: float, most_missed: fl
     base = columns_of(shoulder)
     if not _shoulder_allows(chain, base):
         return math.inf
-    x, y, z = turn_group(base, q[4], q[5], 0.0)[2]
-    tx, ty, tz = hand
-    sine = clip(dot(y, tx), -1.0, 1.0)
-    pronation = from_above(angle_of(-dot(z, tx), dot(x, tx)))
-    flexion = angle_of(sine, math.sqrt(1.0 - sine * sine))
-    deviation = angle_of(-dot(y, tz), dot(y, ty))
+    pronation, flexion, deviation = hand_angles(turn_group(base, q[4], q[5], 0.0)[2], hand)
     lower, upper = chain.lower, chain.upper
     missed = beyond(pronation, lower[2], upper[2]) + beyond(flexion, lower[3], upper[3])
     missed += beyond(deviation, lower[4], upper[4])

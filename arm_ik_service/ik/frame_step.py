@@ -24,6 +24,7 @@ from arm_ik_service.arm.chain import Columns, columns_of, wrist_at
 from arm_ik_service.arm.configuration import integrate, read_configuration, store_configuration
 from arm_ik_service.arm.tangent import Tangent
 from arm_ik_service.compiled import Record, compiled, inlined
+from arm_ik_service.geometry.follower import followed_rate
 from arm_ik_service.geometry.scalar import Vector, clip, components, norm, scale, store, subtract
 from arm_ik_service.geometry.trigonometry import angle_of, sine_cosine
 from arm_ik_service.ik.any_rotation import POSITION_ALONE, STUCK_M, deadline_of, reach_with_any_rotation
@@ -65,13 +66,12 @@ def towards_comfort(arm: Record, settings: Record, reach: Reach, rotation: Colum
     """Return the motion about the line from shoulder to wrist towards less discomfort, within the speed bound."""
     chain, q = arm.chain, arm.configuration
     upper_arm = columns_of((q[0], q[1], q[2], q[3]))
-    side = elbow_side(reach, upper_arm)
+    side = elbow_side(reach[0][0], upper_arm)
     _, slope, curvature = discomfort(arm.comfort, arm.habit, chain, reach, rotation, side)
     arm.elbow_confidence = max(curvature, 0.0) / (max(curvature, 0.0) + HALF_SURE)
     # A critically damped follower, so that the swivel's speed is continuous and its lag is swivel_time_s.
     away = -slope / max(abs(curvature), FLAT)
-    stiff = 2.0 * dt_s / max(settings.swivel_time_s, 1e-6)
-    speed = (arm.swivel_speed + stiff * stiff / dt_s * away) / (1.0 + 2.0 * stiff + stiff * stiff)
+    speed = followed_rate(arm.swivel_speed, away, max(settings.swivel_time_s, 1e-6), dt_s)
     gain = settings.swivel_acceleration_rad_s2 * dt_s
     speed = clip(speed, arm.swivel_speed - gain, arm.swivel_speed + gain)
     speed = clip(speed, -settings.swivel_speed_rad_s, settings.swivel_speed_rad_s)

@@ -69,7 +69,6 @@ def initialise_arm(arm: Record, model: ArmModel) -> None:
     arm["chain"] = model.chains[0]
     arm["comfort"] = list(COMFORT.values())
     arm["configuration"] = model.rest
-    arm["before"] = model.rest
     arm["shown"] = model.rest
 
 

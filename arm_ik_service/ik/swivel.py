@@ -72,11 +72,11 @@ def elbow_swivel(reach: Reach, upper_arm: Columns) -> float:
 
 
 @inlined
-def elbow_side(reach: Reach, upper_arm: Columns) -> Vector:
-    """Direction [unit] from the line of `reach` to the elbow, at the swivel of an upper arm."""
-    side = cross(reach[0][0], upper_arm[2])
+def elbow_side(axis: Vector, upper_arm: Columns) -> Vector:
+    """Direction [unit] from the line along `axis` to the elbow, at the swivel of an upper arm."""
+    side = cross(axis, upper_arm[2])
     length = norm(side)
-    return scale(1.0 / length, side) if length > 1e-9 else reach[0][1]
+    return scale(1.0 / length, side) if length > 1e-9 else upper_arm[0]
 
 
 @inlined
@@ -99,12 +99,18 @@ def bones_at(reach: Reach, side: Vector) -> tuple[Columns, Columns]:
 @compiled
 def posture_at(reach: Reach, rotation: Columns, swivel: float) -> Posture:
     """The arm whose wrist is where `reach` says and whose hand bone has `rotation`; angles not held to any range."""
-    upper_arm, (fx, fy, z) = bones_at(reach, side_at(reach, swivel))
-    tx, ty, tz = rotation
+    upper_arm, forearm = bones_at(reach, side_at(reach, swivel))
+    pronation, wrist_flexion, deviation = hand_angles(forearm, rotation)
+    return upper_arm, angle_of(reach[3], reach[4]), pronation, wrist_flexion, deviation
+
+
+@inlined
+def hand_angles(forearm: Columns, hand: Columns) -> tuple[float, float, float]:
+    """Pronation, wrist flexion and deviation that take a forearm before pronation to a hand bone."""
+    fx, fy, z = forearm
+    tx, ty, tz = hand
     sine = clip(dot(fy, tx), -1.0, 1.0)
     return (
-        upper_arm,
-        angle_of(reach[3], reach[4]),
         from_above(angle_of(-dot(z, tx), dot(fx, tx))),
         angle_of(sine, math.sqrt(1.0 - sine * sine)),
         angle_of(-dot(fy, tz), dot(fy, ty)),

@@ -14,8 +14,8 @@ def give_way(*, entirely: bool = False) -> None:
     Where the system knows such a thing. To be called before anything that works.
 
     `entirely` is for what nobody waits for, such as a file: it runs where nobody else wants to, and ends its turn at
-    once for whoever does. A merely nice process keeps its for some milliseconds (measured on two cores, a view that
-    writes a file: p99 of the round trips beside it 0.8 to 2.1 ms, and 0.8 to 0.9 ms with this).
+    once for whoever does. A merely nice process keeps a processor for some milliseconds (measured on two cores, a view
+    that writes a file: p99 of the round trips beside it 0.8 to 2.1 ms, and 0.8 to 0.9 ms with this).
     """
     if hasattr(os, "nice"):
         os.nice(NICENESS)

@@ -7,17 +7,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from persons import Array, Records, Take, run
+from persons import Array, Records, Take, distance_m, measures_of, run
 
 from arm_ik_service.body.calibration import calibrate
-from arm_ik_service.body.profile import BodyMeasures, Profile
+from arm_ik_service.body.profile import Profile
 from arm_ik_service.geometry import batch
 from arm_ik_service.io.session import open_session
 from arm_ik_service.programs.calibrator import as_records
 
-
-def _length(truth: dict[str, Array], a: str, b: str) -> float:
-    return float(np.median(np.linalg.norm(truth[a] - truth[b], axis=1)))
+BONES = (("shoulder", "elbow"), ("elbow", "wrist"))
 
 
 def test_shoulders_are_found_on_people_of_every_family(recordings: Path) -> None:
@@ -27,12 +25,7 @@ def test_shoulders_are_found_on_people_of_every_family(recordings: Path) -> None
             truth = {name: archive[name] for name in archive.files}
         poses = np.stack([truth["head"], truth["left"], truth["right"]], axis=1).astype(float)
         take = Take(truth["t"], poses, np.full(poses.shape[:2], 15))
-        measures = BodyMeasures(
-            upper_arm_m=_length(truth, "left_shoulder", "left_elbow"),
-            forearm_m=_length(truth, "left_elbow", "left_wrist"),
-            shoulder_width_m=_length(truth, "left_shoulder", "right_shoulder"),
-        )
-        body = run(take.frames, profile=Profile(body=measures)).body
+        body = run(take.frames, profile=Profile(body=measures_of(truth))).body
         for k, side in enumerate(("left", "right")):
             away = np.linalg.norm(body["shoulders"][:, k] - truth[f"{side}_shoulder"], axis=1)
             errors_m[path.name.split("_")[0]].append(away.mean())
@@ -53,12 +46,8 @@ def test_arms_are_measured_to_a_few_percent_on_people_of_every_family_and_no_sur
     for path in sorted((recordings / "mocap").glob("*.npz")):
         with np.load(path) as archive:
             truth = {name: archive[name] for name in archive.files}
-        length_m = np.mean(
-            [
-                _length(truth, f"{side}_shoulder", f"{side}_elbow") + _length(truth, f"{side}_elbow", f"{side}_wrist")
-                for side in ("left", "right")
-            ]
-        )
+        bones = [(f"{side}_{a}", f"{side}_{b}") for side in ("left", "right") for a, b in BONES]
+        length_m = sum(distance_m(truth, *bone) for bone in bones) / 2.0
         found = calibrate(_frames(path)[0], "moving")
         error_m = found.profile.body.upper_arm + found.profile.body.forearm - length_m
         errors[path.name.split("_")[0]].append(abs(error_m) / length_m)

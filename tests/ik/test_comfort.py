@@ -64,7 +64,7 @@ def test_slope_and_curvature_are_the_finite_differences(share: float) -> None:
 def test_a_side_and_its_swivel_say_the_same() -> None:
     for reach, rotation, swivel in postures(0.9, 50):
         upper_arm = posture_at(reach, rotation, swivel)[0]
-        assert elbow_side(reach, upper_arm) == pytest.approx(side_at(reach, swivel), abs=1e-9)
+        assert elbow_side(reach[0][0], upper_arm) == pytest.approx(side_at(reach, swivel), abs=1e-9)
 
 
 def test_discomfort_rises_towards_a_limit() -> None:
