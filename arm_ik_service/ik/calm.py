@@ -1,10 +1,11 @@
 """The arm as it is shown: its elbow follows the solve's about the line from shoulder to wrist, calmly.
 
 The solve answers every frame for itself. Where a joint's limit is in the way its elbow starts, stops and leaps within a
-frame, as no elbow of a person does. What is shown follows it in about the time in which the hand moves on by
-`elbow_lag_m`: an elbow hardly moves while a hand only turns in its place, and at once when the hand goes somewhere
-(both as measured on recorded arms). The hand itself stays where it is; it is turned less than asked for as long as the
-wrist would be beyond its limits.
+frame, as no elbow of a person does. Two things make it calm. What is sudden is not followed: an acceleration beyond
+SUDDEN_M_S2 opens a gap to the solve's elbow that closes without haste. And what is left is followed in about the time
+in which the hand moves on by `elbow_lag_m`: an elbow hardly moves while a hand only turns in its place, and at once
+when the hand goes somewhere (both as measured on recorded arms). The hand itself stays where it is; it is turned less
+than asked for as long as the wrist would be beyond its limits.
 
 The solve does not know what is shown, so nothing can swing up between the two. The elbow's turn is measured against
 the line's own motion (parallel transport), which has no preferred direction and therefore no pole.
@@ -38,8 +39,10 @@ from arm_ik_service.ik.conjugate import NEAREST, SOLVED, rotation_error
 from arm_ik_service.ik.swivel import beyond, elbow_side, hand_angles
 
 LONGEST_S = 0.2  # that an elbow takes while the hand rests
-MOST_M_S2 = 30.0  # acceleration of an elbow about the line
-SMALLEST_LEVER_M = 0.02  # of the elbow about the line, for that: nobody sees a straight arm turn
+SUDDEN_M_S2 = 3.0  # acceleration of the solve's elbow about the line that is not followed at once ...
+SUDDEN_TIME_S = 0.1  # ... but in about this time
+MOST_M_S2 = 20.0  # acceleration about the line of the elbow shown
+SMALLEST_LEVER_M = 0.02  # of the elbow about the line, for both: nobody sees a straight arm turn
 FASTEST_RAD_S = 20.0  # about the line; what is faster is a leap, which leaves no swing behind
 STEP_M = 0.02  # of an elbow in a frame that may be made for the wrist's sake alone
 LARGEST_RAD = 0.3  # by which an elbow comes after the solve's: from farther away there may be no way
@@ -62,18 +65,21 @@ def calm(arm: Record, settings: Record, rotation: Columns, dt_s: float) -> None:
     side = elbow_side(axis, upper_arm)
     if arm.calm_started == 0:
         arm.calm_started, arm.calm_turn, arm.calm_speed = 1, 0.0, 0.0
+        arm.calm_gap, arm.calm_gap_rate = 0.0, 0.0
     else:
         came_from = rotate(between(vector(arm.calm_axis), axis), vector(arm.calm_side))
-        to_go = wrap(angle_of(dot(cross(came_from, side), axis), dot(came_from, side)) - arm.calm_turn)
+        turned = angle_of(dot(cross(came_from, side), axis), dot(came_from, side))
+        to_go = wrap(turned - arm.calm_turn)
         along = dot(upper_arm[1], axis)
-        lever_m = chain.upper_arm_m * math.sqrt(max(1.0 - along * along, 0.0))
+        lever_m = max(chain.upper_arm_m * math.sqrt(max(1.0 - along * along, 0.0)), SMALLEST_LEVER_M)
         speed_m_s = norm(subtract(wrist, vector(arm.calm_wrist))) / dt_s
         time_s = min(settings.elbow_lag_m / max(speed_m_s, 1e-6), LONGEST_S)
-        wanted = _follow(arm, to_go, time_s, MOST_M_S2 / max(lever_m, SMALLEST_LEVER_M), dt_s) - to_go
+        gap = _gap(arm, turned / dt_s, SUDDEN_M_S2 / lever_m, dt_s)
+        wanted = _follow(arm, to_go + gap, time_s, MOST_M_S2 / lever_m, dt_s) - to_go
         turn, missed = clip(wanted, -LARGEST_RAD, LARGEST_RAD), 0.0
         if abs(turn) > UNSEEN_RAD:
             # where the wrist has it come nearer, it comes no faster than the solve's elbow goes, or a little
-            most = max(abs(to_go + arm.calm_turn), abs(to_go + turn), STEP_M / max(lever_m, SMALLEST_LEVER_M))
+            most = max(abs(turned), abs(to_go + turn), STEP_M / lever_m)
             turn, missed = _turned(arm, axis, upper_arm, turn, clip(to_go, -most, most) - to_go)
         if turn != wanted:
             speed = (to_go + turn) / dt_s
@@ -84,6 +90,20 @@ def calm(arm: Record, settings: Record, rotation: Columns, dt_s: float) -> None:
     store(arm.calm_wrist, wrist)
     store(arm.calm_axis, axis)
     store(arm.calm_side, side)
+
+
+@inlined
+def _gap(arm: Record, speed: float, most: float, dt_s: float) -> float:
+    """How far [rad] what is to be followed is from the solve's elbow, which goes at `speed` [rad/s] about the line.
+
+    It is opened by what that changed faster than `most` [rad/s^2], and closes as a critically damped spring does.
+    """
+    change = (speed - arm.calm_solved_speed) / dt_s if arm.calm_started == 2 else 0.0
+    arm.calm_started, arm.calm_solved_speed = 2, speed
+    rate = arm.calm_gap_rate - (change - clip(change, -most, most)) * dt_s
+    arm.calm_gap_rate = followed_rate(rate, -arm.calm_gap, SUDDEN_TIME_S, dt_s)
+    arm.calm_gap = clip(arm.calm_gap + arm.calm_gap_rate * dt_s, -LARGEST_RAD, LARGEST_RAD)
+    return float(arm.calm_gap)
 
 
 @inlined

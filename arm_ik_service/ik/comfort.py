@@ -46,8 +46,9 @@ COMFORT: dict[str, float] = {
 WRIST_SCALE = 0.5  # [rad] half of the wrist's functional range (Ryu et al. 1991): beyond, the penalty flattens
 HABIT_SHARE = 0.5  # of a person's usual wrist flexion and deviation that counts as their rest
 HABIT_TIME_S = 5.0  # over which the usual is averaged
-LIMIT_MARGIN = 0.05  # [rad] ahead of a limit where discomfort begins to rise
-LIMIT_WEIGHT = 3.0  # [1/rad^2] how steeply
+LIMIT_MARGIN = 0.3  # [rad] ahead of a limit where discomfort begins to rise
+SWING_MARGIN = 0.1  # [rad] the same for the swing, as far as `swing_surely_inside` tells
+LIMIT_WEIGHT = 1.0  # [1/rad^2] how steeply; gently, so that the elbow starts no sooner than an elbow can
 
 
 @inlined
@@ -82,7 +83,7 @@ def discomfort(comfort: Any, habit: Any, chain: Record, reach: Reach, rotation: 
     total = add(total, jet.square(LIMIT_WEIGHT, jet.outside(deviation, lower[4] + m, upper[4] - m)))
     lowest, highest = twist_range(chain, -y[0][1])
     total = add(total, jet.square(LIMIT_WEIGHT, jet.outside(twist, lowest + m, highest - m)))
-    beyond = -1.0 if swing_surely_inside(chain, upper_arm) else swing_excess(chain, scale(-1.0, y[0])) + m
+    beyond = -1.0 if swing_surely_inside(chain, upper_arm) else swing_excess(chain, scale(-1.0, y[0])) + SWING_MARGIN
     if beyond > 0.0:
         rate = dot(swing_gradient(chain, upper_arm), components(upper_arm, axis))
         total = add(total, jet.square(LIMIT_WEIGHT, (beyond, rate, 0.0)))

@@ -47,7 +47,7 @@ from arm_ik_service.ik.swivel import (
 )
 
 SEEDS = 24  # swivels looked at when there is no good start: every 15 degrees
-FLAT = 0.3  # curvature below which discomfort counts as flat: Newton's step would be too long
+FLAT = 0.8  # curvature below which discomfort counts as flat: Newton's step would be too long
 GIVE_TIME_S = 0.3  # in which the carrying angle and the wrist's axial play come back to zero
 HALF_SURE = 1.0  # curvature at which the elbow's confidence is one half
 CARRIED = 0.7  # of an arm's bend that may be carrying angle

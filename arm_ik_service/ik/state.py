@@ -30,10 +30,13 @@ ARM = record_dtype(
         ("kept", np.float64, (10,)),  # the best so far while another start is tried
         ("asked", np.float64, (3,)),  # of the hand one frame ago [m], in the arm's axes
         ("anchor", np.float64, (10,)),  # configuration at the beginning of the frame
-        ("calm_started", np.int64),  # 1: there was a frame before, of which the solve had
+        ("calm_started", np.int64),  # 1: there was a frame before (2: and one before that), of which the solve had
         ("calm_wrist", np.float64, (3,)),  # its wrist there [m],
         ("calm_axis", np.float64, (3,)),  # the line to it [unit],
         ("calm_side", np.float64, (3,)),  # and its elbow in this direction from that line [unit]
+        ("calm_solved_speed", np.float64),  # that elbow's [rad/s] about the line
+        ("calm_gap", np.float64),  # [rad] from it to what is followed, where it went too suddenly
+        ("calm_gap_rate", np.float64),  # [rad/s] of that
         ("calm_turn", np.float64),  # [rad] about that line, from the solve's elbow to the one shown
         ("calm_speed", np.float64),  # [rad/s] of the one shown
         # the answer; positions and rotations in the shoulder frame of the arm's own side

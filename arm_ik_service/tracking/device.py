@@ -12,7 +12,7 @@ from arm_ik_service.geometry import scalar as g
 from arm_ik_service.geometry.scalar import Quaternion, Vector
 from arm_ik_service.tracking.glitch import agreeing_moves, gate_interval_s, human_move, human_turn, suspect
 from arm_ik_service.tracking.reacquire import fading_offset, start_fading
-from arm_ik_service.tracking.smoothing import restart, smooth_position, smooth_rotation
+from arm_ik_service.tracking.smoothing import note_position, note_rotation, restart, smooth_position, smooth_rotation
 from arm_ik_service.tracking.state import HELD, INFERRED, LOST, NEVER_S
 from arm_ik_service.tracking.validity import position_quality, rotation_quality
 
@@ -76,25 +76,18 @@ def _follow_position(
         offset = g.subtract(expected, position) if device.position_age_s < NEVER_S else (0.0, 0.0, 0.0)
         start_fading(channel, offset, settings.reacquire_m_s)
         restart(channel, position)
-        g.store(channel.rate, (0.0, 0.0, 0.0))
     else:
-        moved = g.subtract(position, g.vector(channel.measured))
-        g.store(channel.rate, g.scale(1.0 / since_s, moved))
-        smooth_position(channel, position, min(since_s, LONGEST_STEP_S), settings.smoothing)
+        note_position(channel, position, since_s, min(since_s, LONGEST_STEP_S), settings.smoothing)
     channel.source, channel.suspects = source, 0
-    g.store(channel.measured, position)
     return True
 
 
 @compiled
-def _step_position(device: Record, sample: Record, elapsed_s: float, period_s: float, settings: Record) -> None:
+def _place(device: Record, source: int, followed: bool, gain: float, elapsed_s: float, settings: Record) -> None:
+    """Say where the device is, by its memory."""
     channel, before, velocity = device.position_channel, g.vector(device.position), g.vector(device.linear_velocity)
-    source = _source(position_quality(sample), settings)
-    followed = source != LOST and _follow_position(
-        device, g.vector(sample.position), source, elapsed_s, period_s, settings
-    )
     if followed:
-        after = g.add(g.vector(channel.smooth), fading_offset(channel, elapsed_s))
+        after = g.add(smooth_position(channel, gain), fading_offset(channel, elapsed_s))
         known = device.position_age_s < NEVER_S
         rate = g.scale(1.0 / elapsed_s if known else 0.0, g.subtract(after, before))
         g.store(device.linear_velocity, _low_pass(velocity, rate, elapsed_s))
@@ -128,29 +121,22 @@ def _follow_rotation(
         known = device.rotation_age_s < NEVER_S
         start_fading(channel, offset if known else (0.0, 0.0, 0.0), settings.reacquire_rad_s)
         restart(channel, rotation)
-        g.store(channel.rate, (0.0, 0.0, 0.0))
     else:
-        turned = g.log(g.multiply(rotation, g.conjugate(last)))
-        g.store(channel.rate, g.scale(1.0 / since_s, turned))
-        smooth_rotation(channel, rotation, min(since_s, LONGEST_STEP_S), settings.smoothing)
+        note_rotation(channel, rotation, since_s, min(since_s, LONGEST_STEP_S), settings.smoothing)
     channel.source, channel.suspects = source, 0
-    g.store(channel.measured, rotation)
     return True
 
 
 @compiled
-def _step_rotation(device: Record, sample: Record, elapsed_s: float, period_s: float, settings: Record) -> None:
+def _turn(device: Record, source: int, followed: bool, gain: float, elapsed_s: float, settings: Record) -> None:
+    """Say how it is turned."""
     channel, before, velocity = (
         device.rotation_channel,
         g.quaternion(device.rotation),
         g.vector(device.angular_velocity),
     )
-    source = _source(rotation_quality(sample), settings)
-    followed = source != LOST and _follow_rotation(
-        device, g.normalized(g.quaternion(sample.rotation)), source, elapsed_s, period_s, settings
-    )
     if followed:
-        after = g.multiply(g.exp(fading_offset(channel, elapsed_s)), g.quaternion(channel.smooth))
+        after = g.multiply(g.exp(fading_offset(channel, elapsed_s)), smooth_rotation(channel, gain))
         known = device.rotation_age_s < NEVER_S
         rate = g.scale(1.0 / elapsed_s if known else 0.0, g.log(g.multiply(after, g.conjugate(before))))
         g.store(device.angular_velocity, _low_pass(velocity, rate, elapsed_s))
@@ -168,5 +154,16 @@ def _step_rotation(device: Record, sample: Record, elapsed_s: float, period_s: f
 @compiled
 def step_device(device: Record, sample: Record, elapsed_s: float, period_s: float, settings: Record) -> None:
     """Take in one sample, `elapsed_s` after the last one, of a sender whose frames are `period_s` apart."""
-    _step_position(device, sample, elapsed_s, period_s, settings)
-    _step_rotation(device, sample, elapsed_s, period_s, settings)
+    place, turn = device.position_channel, device.rotation_channel
+    place.gain = turn.gain = 0.0
+    place_source = _source(position_quality(sample), settings)
+    placed = place_source != LOST and _follow_position(
+        device, g.vector(sample.position), place_source, elapsed_s, period_s, settings
+    )
+    turn_source = _source(rotation_quality(sample), settings)
+    turned = turn_source != LOST and _follow_rotation(
+        device, g.normalized(g.quaternion(sample.rotation)), turn_source, elapsed_s, period_s, settings
+    )
+    gain = max(place.gain, turn.gain)  # one for both: what is rigid stays rigid
+    _place(device, place_source, placed, gain, elapsed_s, settings)
+    _turn(device, turn_source, turned, gain, elapsed_s, settings)

@@ -30,7 +30,12 @@ def _channel(components: int) -> np.dtype[np.void]:
             ("suspected_for_s", np.float64),  # how long such samples have agreed with each other
             ("suspects", np.int64),  # how many they are
             ("smooth", *value),  # the 1 Euro filter's
+            ("gain", np.float64),  # what part of the way to the sample it wants to go in this frame; 0 if there is none
             ("slope", *tangent),  # its estimate of the rate
+            ("noise_squared", np.float64),  # its estimate of the data's noise, from ...
+            ("rate_before", *tangent),  # ... the rate before,
+            ("change", *tangent),  # and by how much that had changed
+            ("samples", np.int64),  # since the filter started afresh, as far as they matter
             ("restarted_s", np.float64),  # since the filter started afresh
             ("offset", *tangent),  # what the output was away from the data when it was last re-acquired
             ("fading_s", np.float64),  # since then
