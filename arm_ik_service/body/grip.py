@@ -17,7 +17,7 @@ from arm_ik_service.geometry.scalar import Vector
 
 GRIP_TIME_S = 3.0  # in which a constant shortfall is learnt at first ...
 GRIP_SETTLES_AFTER_S = 120.0  # ... and the time after which it takes twice as long
-ENOUGH_RAD = 0.17  # shortfalls up to this are of limits that are a little narrow, or of a swing that went too far
+ENOUGH_RAD = 0.1  # shortfalls up to this are of limits that are a little narrow, or of a swing that went too far
 LARGEST_SHORTFALL_RAD = (
     0.35  # more of a single frame counts as this: it is a hand that let go, or a rotation gone wrong
 )

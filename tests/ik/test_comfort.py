@@ -11,7 +11,7 @@ from arm_ik_service.arm.limits import swing_surely_inside, twist_of
 from arm_ik_service.arm.model import ArmModel
 from arm_ik_service.compiled import Record
 from arm_ik_service.geometry.jet import Jet
-from arm_ik_service.ik.comfort import COMFORT, LIMIT_MARGIN, discomfort
+from arm_ik_service.ik.comfort import COMFORT, LIMIT_MARGIN, LIMIT_WEIGHT, SWING_MARGIN, discomfort
 from arm_ik_service.ik.swivel import Reach, elbow_side, posture_at, reach_to, side_at, swivel_of, violation
 
 RIGHT = ArmModel.load()
@@ -67,12 +67,16 @@ def test_a_side_and_its_swivel_say_the_same() -> None:
         assert elbow_side(reach[0][0], upper_arm) == pytest.approx(side_at(reach, swivel), abs=1e-9)
 
 
-def test_discomfort_rises_towards_a_limit() -> None:
-    rises = 0
-    for reach, rotation, swivel in postures(0.99, 200):
-        here = violation(CHAIN, posture_at(reach, rotation, swivel), LIMIT_MARGIN)
-        ahead = violation(CHAIN, posture_at(reach, rotation, swivel + 1e-3), LIMIT_MARGIN)
-        if ahead > here + 1e-6:
-            assert at(reach, rotation, swivel)[1] > at(reach, rotation, swivel, UNLIMITED)[1]
-            rises += 1
-    assert rises > 10
+def test_discomfort_rises_ahead_of_every_limit_and_nowhere_else() -> None:
+    free = beyond = 0
+    for reach, rotation, start in postures(0.99, 200):
+        for swivel in start + np.linspace(-1.0, 1.0, 9):
+            posture = posture_at(reach, rotation, swivel)
+            extra = at(reach, rotation, swivel)[0] - at(reach, rotation, swivel, UNLIMITED)[0]
+            if violation(CHAIN, posture, 0.0) > 0.0:
+                assert extra > LIMIT_WEIGHT * SWING_MARGIN**2
+                beyond += 1
+            elif swing_surely_inside(CHAIN, posture[0]) and violation(CHAIN, posture, LIMIT_MARGIN) == 0.0:
+                assert extra == pytest.approx(0.0, abs=1e-12)
+                free += 1
+    assert min(free, beyond) > 100
