@@ -27,6 +27,7 @@ SLOPE_HZ = 2.0  # cutoff of the speed estimate ...
 NOISE_HZ = 0.5  # ... and of that of the noise
 STARTS_FOR_S = 0.05  # after a start the estimates are of little use, and the data passes as it is
 KNOWS_NOISE_FROM = 4  # samples: so many make a third difference
+NOWHERE = 1e-9  # [m, rad]: a quantity that has no way to go does not hurry the other one
 # rest_hz; rise [Hz per m/s, per rad/s]; threshold [m/s, rad/s]; leash [m, rad]; the same in noises (RMS of the vector)
 POSITION_FILTERS = ((0.0, 0.0, 0.0, 0.0, 0.0), (1.6, 400.0, 0.06, 0.003, 2.0), (0.8, 30.0, 0.04, 0.02, math.inf))
 ROTATION_FILTERS = ((0.0, 0.0, 0.0, 0.0, 0.0), (1.6, 100.0, 0.3, 0.02, 2.0), (0.8, 10.0, 0.2, 0.1, math.inf))
@@ -65,9 +66,9 @@ def _adaptive_gain(channel: Record, filters: Any, level: int, away: float, dt_s:
     noise = _noise(channel, dt_s)
     if level == OFF:
         return 1.0
-    leash = min(longest, noises * noise) if noises < math.inf else longest
-    if leash <= 0.0:
-        return 1.0
+    if away < NOWHERE:
+        return 0.0
+    leash = max(min(longest, noises * noise), NOWHERE) if noises < math.inf else longest
     gain = _gain(rest_hz + rise * max(g.norm(slope) - threshold, 0.0), dt_s)
     gain = max(gain, min(2.0 - channel.restarted_s / STARTS_FOR_S, 1.0))
     squared = ((1.0 - gain) * away / leash) ** 2

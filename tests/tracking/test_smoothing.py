@@ -72,7 +72,7 @@ def test_a_smooth_hand_is_left_alone(rate: float) -> None:
     take = take.moved(LEFT, swing).turned(LEFT, batch.exp(0.5 * np.sin(angle) * np.array([1.0, 0.2, 0.0])))
     made = run(take.frames, tracking=TrackingSettings(smoothing="light"))
     assert np.abs(made.position(LEFT) - take.poses[:, LEFT, :3]).max() < (3e-3 if rate < 60.0 else 2e-4)
-    assert jerk_rms(take.t, made.position(LEFT)) == pytest.approx(jerk_rms(take.t, take.poses[:, LEFT, :3]), rel=0.02)
+    assert jerk_rms(take.t, made.position(LEFT)) == pytest.approx(jerk_rms(take.t, take.poses[:, LEFT, :3]), rel=0.04)
 
 
 def test_position_and_rotation_go_the_same_part_of_the_way() -> None:
