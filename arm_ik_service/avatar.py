@@ -150,7 +150,7 @@ class Avatars:
                 return False
         for arm, q in zip(row.arms, configurations, strict=True):
             arm["configuration"] = q
-            arm["shown"] = q
+            arm["shown"] = arm["goal"] = q
             arm["started"] = 1  # not a first frame: it would choose the elbow afresh
         left, right = state.left.bones, state.right.bones
         resume_learning(

@@ -133,6 +133,7 @@ def report_error(arm: Record, asked: Vector, position: Vector) -> None:
     if position != asked:
         arm.position_error_m = norm(subtract(asked, wrist_at(arm.chain, arm.configuration)))
         arm.status = NEAREST
+    arm.missed_m = arm.position_error_m
 
 
 @compiled

@@ -50,10 +50,10 @@ def hold_elbow(arm: Record, settings: Record, position: Vector, rotation: Column
 def hold_hand(arm: Record, settings: Record, asked: Vector, position: Vector, rotation: Columns, dt_s: float) -> bool:
     """Where the hand would leap to its `position`, it goes part of the way. Returns whether it was free to go.
 
-    To be called before the errors of this frame take the place of the last one's in `arm`.
+    To be called before the error of this frame takes the place of the last one's in `arm.missed_m`.
     """
     chain, work, q = arm.chain, arm.work, arm.configuration
-    if arm.position_error_m <= STUCK_M and work.position_error_m <= STUCK_M:
+    if arm.missed_m <= STUCK_M and work.position_error_m <= STUCK_M:
         return True  # a hand that follows does not leap
     before = wrist_at(chain, arm.anchor)
     way = subtract(wrist_at(chain, q), before)

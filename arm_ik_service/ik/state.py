@@ -39,9 +39,13 @@ ARM = record_dtype(
         ("calm_gap_rate", np.float64),  # [rad/s] of that
         ("calm_turn", np.float64),  # [rad] about that line, from the solve's elbow to the one shown
         ("calm_speed", np.float64),  # [rad/s] of the one shown
+        ("missed_m", np.float64),  # what the solve's hand was off, one frame ago until this one is solved
+        ("goal", np.float64, (10,)),  # of what is shown: the solve's with its elbow calmed
+        ("crosses", np.int64),  # 1: what is shown is on its way to a goal that leapt
+        ("crossing_work", WORK),
         # the answer; positions and rotations in the shoulder frame of the arm's own side
         ("configuration", np.float64, (10,)),
-        ("shown", np.float64, (10,)),  # the configuration with its elbow calmed
+        ("shown", np.float64, (10,)),  # the configuration with its elbow calmed, and without leaps
         ("published", np.float64, (10,)),  # the one shown, or where its velocity leads to
         ("velocity", np.float64, (9,)),  # [rad/s], tangent order
         ("angles", np.float64, (9,)),  # arm.model.ANGLES [rad]
@@ -72,7 +76,7 @@ def initialise_arm(arm: Record, model: ArmModel) -> None:
     arm["chain"] = model.chains[0]
     arm["comfort"] = list(COMFORT.values())
     arm["configuration"] = model.rest
-    arm["shown"] = model.rest
+    arm["shown"] = arm["goal"] = model.rest
 
 
 def new_arm(model: ArmModel) -> npt.NDArray[Any]:

@@ -1,0 +1,107 @@
+"""The way the arm that is shown takes to where the solve's arm has leapt.
+
+Where limits leave the hand no way on, the solve's arm goes to another posture within a frame, and while the hand cannot
+be met at all its joints may jump about between postures that are as good. What is shown comes after in its own time:
+the gap between the two, a tangent, closes as a critically damped spring does (games call that inertialisation: Bollo,
+GDC 2018). On the way the hand is brought to where it should be by a few iterations of the loop a frame, so few that the
+elbow goes smoothly even where the loop would slide it far, and it is turned as the solve turns it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from arm_ik_service.arm import tangent
+from arm_ik_service.arm.chain import Columns, columns_of, forearm_columns, turn_group, wrist_at
+from arm_ik_service.arm.configuration import difference, integrate, read_configuration, store_configuration
+from arm_ik_service.arm.tangent import Tangent
+from arm_ik_service.compiled import Record, compiled, inlined
+from arm_ik_service.geometry.scalar import Vector, clip, norm, subtract
+from arm_ik_service.ik.any_rotation import POSITION_ALONE, STUCK_M
+from arm_ik_service.ik.conjugate import NEAREST, converge, rotation_error
+from arm_ik_service.ik.jacobian import NO_WRENCH, store_wrench
+from arm_ik_service.ik.swivel import hand_angles, nearest_with_room
+
+LEAP_M = 0.08  # of the solve's elbow in a frame, beyond twice what its hand moves: no elbow goes there at once
+TIME_S = 0.08  # in which most of the way is made
+ITERATIONS = 4  # a frame, for the hand
+THERE_RAD, AT_REST_RAD_S = 1e-4, 1e-2  # a gap that is not worth the work
+
+
+@compiled
+def cross_over(arm: Record, settings: Record, asked: Vector, rotation: Columns, dt_s: float) -> None:
+    """Change `arm.shown`, as it should be by now, to what can be `dt_s` [s] after `arm.before`, shown one frame ago.
+
+    `asked` and `rotation` are asked of the hand.
+    """
+    chain = arm.chain
+    # a goal that jumps about, or has just leapt, has no motion to go along with
+    lost = arm.missed_m > STUCK_M or _leapt(chain, arm.goal, arm.shown)
+    goal_before, goal = read_configuration(arm.goal), read_configuration(arm.shown)
+    store_configuration(arm.goal, goal)
+    if settings.elbow_lag_m == 0.0 or arm.started == 0 or not (lost or arm.crosses):
+        arm.crosses = 0
+        return
+    arm.crosses = 1
+    last, rate = read_configuration(arm.before), tangent.read(arm.recent_velocity)
+    gap = difference(goal if lost else goal_before, last)
+    if not lost:
+        rate = tangent.subtract(rate, tangent.scale(1.0 / dt_s, difference(goal_before, goal)))
+    stiff = 2.0 * dt_s / TIME_S
+    rate = tangent.subtract(rate, tangent.scale(stiff * stiff / dt_s, gap))
+    rate = tangent.scale(1.0 / (1.0 + 2.0 * stiff + stiff * stiff), rate)
+    gap = tangent.add(gap, tangent.scale(dt_s, rate))
+    if not lost and _size(gap) < THERE_RAD and _size(rate) < AT_REST_RAD_S:
+        arm.crosses = 0
+        return
+    store_configuration(arm.shown, integrate(chain, goal, gap))
+    _bring_hand(arm, settings, nearest_with_room(chain, asked), rotation)
+    _turn_hand(arm)
+    _report(arm, asked, rotation)
+
+
+@inlined
+def _leapt(chain: Record, before: Any, after: Any) -> bool:
+    """Tell whether an arm's elbow goes from one configuration (10,) to another as no elbow does."""
+    one = columns_of((before[0], before[1], before[2], before[3]))
+    other = columns_of((after[0], after[1], after[2], after[3]))
+    elbow_m = chain.upper_arm_m * norm(subtract(other[1], one[1]))
+    if elbow_m <= LEAP_M:
+        return False
+    return bool(elbow_m > LEAP_M + 2.0 * norm(subtract(wrist_at(chain, after), wrist_at(chain, before))))
+
+
+@inlined
+def _size(t: Tangent) -> float:
+    return norm(t[0]) + norm(t[1]) + norm(t[2])
+
+
+@inlined
+def _bring_hand(arm: Record, settings: Record, position: Vector, rotation: Columns) -> None:
+    work, lam = arm.crossing_work, POSITION_ALONE * settings.rotation_weight_m * settings.rotation_weight_m
+    store_wrench(work.pull, NO_WRENCH)
+    tolerance_m, any_turn = settings.position_tolerance_m, 2.0 * math.pi
+    converge(arm.chain, work, arm.shown, position, rotation, ITERATIONS, lam, tolerance_m, any_turn, 0)
+
+
+@inlined
+def _turn_hand(arm: Record) -> None:
+    """Turn the shown hand as that of the goal, as far as the wrist goes; its axial play stays as it is."""
+    q, goal, lower, upper = arm.shown, arm.goal, arm.chain.lower, arm.chain.upper
+    x, y, z = turn_group(forearm_columns(goal), goal[7], goal[8], goal[9] - q[9])[2]
+    base = columns_of((q[0], q[1], q[2], q[3]))
+    pronation, flexion, deviation = hand_angles(turn_group(base, q[4], q[5], 0.0)[2], (x, y, z))
+    q[6] = clip(pronation, lower[2], upper[2])
+    q[7] = clip(flexion, lower[3], upper[3])
+    q[8] = clip(deviation, lower[4], upper[4])
+
+
+@inlined
+def _report(arm: Record, asked: Vector, rotation: Columns) -> None:
+    """Leave in `arm` how far the hand that is shown is from what was asked."""
+    q = arm.shown
+    arm.position_error_m = norm(subtract(asked, wrist_at(arm.chain, q)))
+    hand = turn_group(forearm_columns(q), q[7], q[8], q[9])[2]
+    arm.orientation_error_rad = norm(rotation_error(hand, rotation))
+    arm.status = NEAREST
