@@ -25,8 +25,11 @@ from arm_ik_service.ik.swivel import hand_angles, nearest_with_room
 
 LEAP_M = 0.08  # of the solve's elbow in a frame, beyond twice what its hand moves: no elbow goes there at once
 TIME_S = 0.08  # in which most of the way is made
-ITERATIONS = 4  # a frame, for the hand
-THERE_RAD, AT_REST_RAD_S = 1e-4, 1e-2  # a gap that is not worth the work
+ITERATIONS = 3  # a frame, for the hand
+ASTRAY_M = 0.02  # a hand that stays this far from where the solve has it is held there by a limit ...
+PATIENCE_S = 0.1  # ... and after this long, in all, it goes the straight way of the joints instead
+NEAR_RAD, SLOW_RAD_S = 1e-4, 1e-2  # a gap that is not worth the work
+THERE, CLOSES, LOST = 0, 1, 2  # what is shown is the goal; comes nearer to it as it moves; or to where it last was
 
 
 @compiled
@@ -35,28 +38,39 @@ def cross_over(arm: Record, settings: Record, asked: Vector, rotation: Columns, 
 
     `asked` and `rotation` are asked of the hand.
     """
-    chain = arm.chain
-    # a goal that jumps about, or has just leapt, has no motion to go along with
-    lost = arm.missed_m > STUCK_M or _leapt(chain, arm.goal, arm.shown)
+    chain, went_on = arm.chain, arm.crosses
+    missed, leapt = arm.missed_m > STUCK_M, _leapt(chain, arm.goal, arm.shown)
     goal_before, goal = read_configuration(arm.goal), read_configuration(arm.shown)
     store_configuration(arm.goal, goal)
-    if settings.elbow_lag_m == 0.0 or arm.started == 0 or not (lost or arm.crosses):
-        arm.crosses = 0
+    if settings.elbow_lag_m == 0.0 or arm.started == 0 or not (missed or leapt or went_on != THERE):
+        arm.crosses = THERE
         return
-    arm.crosses = 1
-    last, rate = read_configuration(arm.before), tangent.read(arm.recent_velocity)
-    gap = difference(goal if lost else goal_before, last)
-    if not lost:
-        rate = tangent.subtract(rate, tangent.scale(1.0 / dt_s, difference(goal_before, goal)))
+    # a goal that jumps about, or has just leapt, has no motion to go along with
+    still = missed or leapt
+    gap = difference(goal if still else goal_before, read_configuration(arm.before))
+    if missed or went_on == LOST:
+        rate = tangent.read(arm.recent_velocity)
+        if not still:
+            rate = tangent.subtract(rate, tangent.scale(1.0 / dt_s, difference(goal_before, goal)))
+    else:
+        rate = tangent.read(arm.crossing_rate) if went_on == CLOSES else tangent.STILL
     stiff = 2.0 * dt_s / TIME_S
     rate = tangent.subtract(rate, tangent.scale(stiff * stiff / dt_s, gap))
     rate = tangent.scale(1.0 / (1.0 + 2.0 * stiff + stiff * stiff), rate)
     gap = tangent.add(gap, tangent.scale(dt_s, rate))
-    if not lost and _size(gap) < THERE_RAD and _size(rate) < AT_REST_RAD_S:
-        arm.crosses = 0
+    tangent.store(arm.crossing_rate, rate)
+    arm.crosses = LOST if missed else CLOSES
+    if not still and _size(gap) < NEAR_RAD and _size(rate) < SLOW_RAD_S:
+        arm.crosses = THERE
         return
     store_configuration(arm.shown, integrate(chain, goal, gap))
-    _bring_hand(arm, settings, nearest_with_room(chain, asked), rotation)
+    position = nearest_with_room(chain, asked)
+    if still:
+        arm.crossing_astray_s = 0.0
+    if arm.crossing_astray_s < PATIENCE_S:
+        _bring_hand(arm, settings, position, rotation)
+        if norm(subtract(wrist_at(chain, arm.shown), position)) > ASTRAY_M:
+            arm.crossing_astray_s += dt_s
     _turn_hand(arm)
     _report(arm, asked, rotation)
 

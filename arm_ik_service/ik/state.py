@@ -41,7 +41,9 @@ ARM = record_dtype(
         ("calm_speed", np.float64),  # [rad/s] of the one shown
         ("missed_m", np.float64),  # what the solve's hand was off, one frame ago until this one is solved
         ("goal", np.float64, (10,)),  # of what is shown: the solve's with its elbow calmed
-        ("crosses", np.int64),  # 1: what is shown is on its way to a goal that leapt
+        ("crosses", np.int64),  # whether what is shown is on its way to a goal that leapt: see ik.crossing
+        ("crossing_rate", np.float64, (9,)),  # [rad/s] of the gap between the two
+        ("crossing_astray_s", np.float64),  # for how long its hand was held up on the way
         ("crossing_work", WORK),
         # the answer; positions and rotations in the shoulder frame of the arm's own side
         ("configuration", np.float64, (10,)),

@@ -22,7 +22,7 @@ from arm_ik_service.compiled import Record, compiled, inlined
 from arm_ik_service.geometry.scalar import clip, quaternion, scale, store, vector
 from arm_ik_service.ik.calm import calm
 from arm_ik_service.ik.conjugate import SOLVED
-from arm_ik_service.ik.crossing import cross_over
+from arm_ik_service.ik.crossing import THERE, cross_over
 from arm_ik_service.ik.frame_step import first_frame, step_frame
 from arm_ik_service.ik.state import ARM, initialise_arm
 from arm_ik_service.ik.velocity import ITERATIONS, SPEED_BIT, velocity_from_twist
@@ -89,7 +89,7 @@ def _move_on(arm: Record, settings: Record, linear: Any, angular: Any, dt_s: flo
     met = arm.status == SOLVED and limits == arm.limits & ~SPEED_BIT
     follows = met and (limits == 0 or arm.started > MET_FRAMES)
     onward = tangent.STILL
-    if arm.started == 0 or (arm.restarted == 1 and arm.crosses == 0):  # a jump is no motion
+    if arm.started == 0 or (arm.restarted == 1 and arm.crosses == THERE):  # a jump is no motion
         arm.started = 1
         tangent.store(arm.recent_velocity, tangent.STILL)
     else:
