@@ -4,7 +4,8 @@ Where limits leave the hand no way on, the solve's arm goes to another posture w
 be met at all its joints may jump about between postures that are as good. What is shown comes after in its own time:
 the gap between the two, a tangent, closes as a critically damped spring does (games call that inertialisation: Bollo,
 GDC 2018). On the way the hand is brought to where it should be by a few iterations of the loop a frame, so few that the
-elbow goes smoothly even where the loop would slide it far, and it is turned as the solve turns it.
+elbow goes smoothly even where the loop would slide it far, no faster than a hand is let come back elsewhere, and it is
+turned as the solve turns it.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from arm_ik_service.geometry.scalar import Vector, clip, norm, subtract
 from arm_ik_service.ik.any_rotation import POSITION_ALONE, STUCK_M
 from arm_ik_service.ik.conjugate import NEAREST, converge, rotation_error
 from arm_ik_service.ik.jacobian import NO_WRENCH, store_wrench
+from arm_ik_service.ik.pace import CATCH_UP_M_S, go_part_of_the_way
 from arm_ik_service.ik.swivel import hand_angles, nearest_with_room
 
 LEAP_M = 0.08  # of the solve's elbow in a frame, beyond twice what its hand moves: no elbow goes there at once
@@ -41,6 +43,7 @@ def cross_over(arm: Record, settings: Record, asked: Vector, rotation: Columns, 
     chain, went_on = arm.chain, arm.crosses
     missed, leapt = arm.missed_m > STUCK_M, _leapt(chain, arm.goal, arm.shown)
     goal_before, goal = read_configuration(arm.goal), read_configuration(arm.shown)
+    goals_way_m = norm(subtract(wrist_at(chain, arm.shown), wrist_at(chain, arm.goal)))
     store_configuration(arm.goal, goal)
     if settings.elbow_lag_m == 0.0 or arm.started == 0 or not (missed or leapt or went_on != THERE):
         arm.crosses = THERE
@@ -71,6 +74,7 @@ def cross_over(arm: Record, settings: Record, asked: Vector, rotation: Columns, 
         _bring_hand(arm, settings, position, rotation)
         if norm(subtract(wrist_at(chain, arm.shown), position)) > ASTRAY_M:
             arm.crossing_astray_s += dt_s
+    _hold_hand(arm, max(goals_way_m, CATCH_UP_M_S * dt_s))
     _turn_hand(arm)
     _report(arm, asked, rotation)
 
@@ -97,6 +101,16 @@ def _bring_hand(arm: Record, settings: Record, position: Vector, rotation: Colum
     store_wrench(work.pull, NO_WRENCH)
     tolerance_m, any_turn = settings.position_tolerance_m, 2.0 * math.pi
     converge(arm.chain, work, arm.shown, position, rotation, ITERATIONS, lam, tolerance_m, any_turn, 0)
+
+
+@inlined
+def _hold_hand(arm: Record, allowed_m: float) -> None:
+    """Let the hand go no farther in a frame than it may."""
+    before = wrist_at(arm.chain, arm.before)
+    way_m = norm(subtract(wrist_at(arm.chain, arm.shown), before))
+    if way_m > allowed_m:
+        start, end = read_configuration(arm.before), read_configuration(arm.shown)
+        go_part_of_the_way(arm.chain, start, end, before, way_m, allowed_m, arm.shown)
 
 
 @inlined

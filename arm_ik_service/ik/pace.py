@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from arm_ik_service.arm import tangent
 from arm_ik_service.arm.chain import Columns, columns_of, wrist_at
 from arm_ik_service.arm.configuration import (
@@ -68,7 +70,8 @@ def hold_hand(arm: Record, settings: Record, asked: Vector, position: Vector, ro
     work.iterations = reach_with_any_rotation(arm, settings, nearer, rotation, reach, swivel, work.iterations)
     arm.restarted = restarted  # the elbow has leapt all the same
     if norm(subtract(wrist_at(chain, q), before)) > allowed_m + STUCK_M:  # not with these limits
-        _go_part_of_the_way(arm, end, before, way_m, allowed_m)
+        go_part_of_the_way(chain, read_configuration(arm.anchor), end, before, way_m, allowed_m, q)
+        arm.restarted = 0
     here = jacobian_at(chain, read_configuration(q))
     work.position_error_m = norm(subtract(position, here.from_shoulder))
     work.orientation_error_rad = norm(rotation_error(here.hand, rotation))
@@ -77,12 +80,13 @@ def hold_hand(arm: Record, settings: Record, asked: Vector, position: Vector, ro
 
 
 @compiled
-def _go_part_of_the_way(arm: Record, end: Configuration, before: Vector, way_m: float, allowed_m: float) -> None:
-    """Move all joints from `arm.anchor` towards a configuration, as far as takes the hand `allowed_m` from `before`.
+def go_part_of_the_way(
+    chain: Record, start: Configuration, end: Configuration, before: Vector, way_m: float, allowed_m: float, q: Any
+) -> None:
+    """Move all joints from one configuration towards another, as far as takes the hand `allowed_m` from `before`.
 
-    All of that motion would take it `way_m`, which is more.
+    All of that motion would take it `way_m`, which is more. The answer goes to `q` (10,).
     """
-    chain, q, start = arm.chain, arm.configuration, read_configuration(arm.anchor)
     motion, share, moved_m = difference(start, end), 1.0, way_m
     for _ in range(PARTS):
         share *= allowed_m / moved_m
@@ -90,4 +94,3 @@ def _go_part_of_the_way(arm: Record, end: Configuration, before: Vector, way_m: 
         moved_m = norm(subtract(wrist_at(chain, q), before))
         if moved_m <= allowed_m:
             break
-    arm.restarted = 0
