@@ -44,7 +44,7 @@ class SolverSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     iterations: Annotated[int, Meta(ge=1, le=10_000)] = 32  # a frame's budget: 0.3 us each
     time_limit_us: Annotated[float, Meta(ge=0.0)] = 0.0  # of one arm's frame; 0: iterations alone bound it
     # Far tighter than an eye needs: what is left of the error is noise in velocity and jerk, and in a smooth walk a
-    # hundredth of a millimetre is as much jerk as there is. A last step more, of a loop that closes in quadratically.
+    # hundredth of a millimetre is as much jerk as there is. It takes an iteration more.
     position_tolerance_m: Annotated[float, Meta(gt=0.0)] = 2e-6
     orientation_tolerance_rad: Annotated[float, Meta(gt=0.0)] = 2e-5
     # the lever on which a radian of hand rotation weighs as much as a metre of position: a hand's length and a bit
@@ -54,7 +54,7 @@ class SolverSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     swivel_speed_rad_s: Annotated[float, Meta(ge=0.0)] = 4.0  # the elbow about the arm's line, for comfort alone
     swivel_acceleration_rad_s2: Annotated[float, Meta(gt=0.0)] = 80.0  # so that joint velocities do not jump
     swivel_time_s: Annotated[float, Meta(ge=0.0)] = 0.08  # in which it covers most of the way to the comfortable place
-    # what is shown follows the solve's elbow in the time in which the hand moves on by so much; 0: at once
+    # what is shown follows the solve's elbow in the time in which the hand moves on by so much; 0: it is the solve's arm
     elbow_lag_m: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.03
 
 
