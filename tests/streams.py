@@ -14,6 +14,7 @@ from arm_ik_service.arm.model import ArmModel
 from arm_ik_service.body.state import TARGET
 from arm_ik_service.compiled import compiled
 from arm_ik_service.geometry import batch
+from arm_ik_service.ik.crossing import LEAP_M
 from arm_ik_service.ik.state import new_arm
 from arm_ik_service.ik.step import step_arm
 from arm_ik_service.settings import SolverSettings, to_record
@@ -102,6 +103,13 @@ def run(arm: ArmModel, targets: npt.NDArray[Any], dt_s: float, settings: SolverS
     record = np.array([to_record(settings or SolverSettings())])
     _run(new_arm(arm), targets, dt_s, record, *vars(answer).values())
     return answer
+
+
+def elbow_leaps(arm: ArmModel, answer: Run) -> Array:
+    """How far [m] the elbow goes in each frame but the first beyond what counts as a leap; positive for one."""
+    steps = np.linalg.norm(np.diff(answer.elbow, axis=0), axis=1)
+    wrists = arm.forward(answer.configuration)["wrist"][:, :3]
+    return np.asarray(steps - LEAP_M - 2.0 * np.linalg.norm(np.diff(wrists, axis=0), axis=1))
 
 
 @compiled

@@ -5,11 +5,12 @@ from __future__ import annotations
 import msgspec
 import numpy as np
 import pytest
-from streams import Array, Run, random_stream, run, targets_of, tumbling
+from streams import Array, Run, elbow_leaps, random_stream, run, targets_of, tumbling
 
 from arm_ik_service.arm.model import ArmModel
 from arm_ik_service.body.report import jerk_rms
 from arm_ik_service.geometry import batch
+from arm_ik_service.ik.any_rotation import STUCK_M
 from arm_ik_service.ik.calm import LARGEST_RAD, LONGEST_S, MOST_MISSED_RAD2
 from arm_ik_service.ik.pace import ELBOW_STEP_M
 from arm_ik_service.ik.state import new_arm
@@ -37,6 +38,13 @@ def both(hands: Array) -> tuple[Run, Run]:
     return run(RIGHT, targets, DT_S), run(RIGHT, targets, DT_S, AT_ONCE)
 
 
+def going_on(solved: Run) -> Array:
+    """Which frames are longer than a second after a leap of the solve's arm, or a hand that it could not meet."""
+    upset = np.concatenate([[False], elbow_leaps(RIGHT, solved) > 0.0]) | (solved.position_error_m > STUCK_M)
+    since = np.arange(len(upset)) - np.maximum.accumulate(np.where(upset, np.arange(len(upset)), -len(upset)))
+    return np.asarray(since * DT_S > 1.0)
+
+
 def wrists(answer: Run) -> Array:
     return np.asarray(RIGHT.forward(answer.configuration)["wrist"][:, :3])
 
@@ -44,7 +52,9 @@ def wrists(answer: Run) -> Array:
 @pytest.mark.parametrize("seed", range(4))
 def test_the_hand_is_where_the_solve_has_it(seed: int) -> None:
     calm, solved = both(random_stream(RIGHT, seed, most_m_s=3.0)[1])
-    np.testing.assert_allclose(wrists(calm), wrists(solved), atol=1e-9)
+    goes_on = going_on(solved)
+    assert goes_on.mean() > 0.9
+    np.testing.assert_allclose(wrists(calm)[goes_on], wrists(solved)[goes_on], atol=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -71,7 +81,7 @@ def test_an_elbow_beside_a_hand_that_waves_hardly_moves() -> None:
 def test_the_elbow_is_never_far_from_the_solves() -> None:
     for hands in (waving(), random_stream(RIGHT, 5, most_m_s=5.0)[1]):
         calm, solved = both(hands)
-        apart = np.linalg.norm(calm.elbow - solved.elbow, axis=1)
+        apart = np.linalg.norm(calm.elbow - solved.elbow, axis=1)[going_on(solved)]
         assert 0.0 < apart.max() < LARGEST_RAD * float(RIGHT.chains[0]["upper_arm_m"])
 
 
