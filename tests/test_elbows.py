@@ -13,18 +13,10 @@ from arm_ik_service.body.profile import Profile
 from arm_ik_service.body.report import jerk_rms
 from arm_ik_service.io.session import open_session
 
-# What is wanted is 1.2; half of all elbows are below 1.1, most of the others below 1.35. Known to be over it: an elbow
-# that leaps once because none lets the hand be where the chest, which is wrongly turned there, has it; hands at the
-# ends of their wrists' ranges; and recordings smoother than a filter leaves what a headset would have given.
-JERK_AT_MOST = 1.35  # of either side
-JERK_KNOWN = {
-    "cmu_salsa_60_01": 12.0,  # or leaps there and back: which of the two hangs on a hair
-    "cmu_salsa_61_02": 7.0,
-    "xia_neutral_01_000": 2.4,
-    "bandai2_wave-both-hands_feminine_012": 2.1,
-    "bandai1_call_normal_001": 1.8,
-    "bandai1_slash_normal_001": 1.8,
-}
+JERK_AT_MOST = 1.25  # of either side; wanted is 1.2, met on the machine it was measured on
+# Dancers whose chest, taken from the head, is up to 75 degrees off: one keeps her eyes where they were while she spins.
+# Their arms run into limits that their own did not; how the arm goes on from there hangs on the last bits of a number.
+JERK_KNOWN = {"cmu_salsa_60_01": 2.0, "cmu_salsa_61_02": 3.5}
 
 
 def test_elbows_are_near_the_recorded_ones_and_hardly_less_calm(recordings: Path) -> None:
