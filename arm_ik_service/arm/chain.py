@@ -92,6 +92,12 @@ def forearm_columns(configuration: Any) -> Columns:
 
 
 @compiled
+def hand_columns(configuration: Any) -> Columns:
+    """ISB axes of the hand bone at a configuration (10,)."""
+    return turn_group(forearm_columns(configuration), configuration[7], configuration[8], configuration[9])[2]
+
+
+@compiled
 def wrist_at(chain: Record, configuration: Any) -> Vector:
     """Return the wrist [m] of a configuration (10,), right arm, ISB axes."""
     base = columns_of((configuration[0], configuration[1], configuration[2], configuration[3]))

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 
-from arm_ik_service.arm.chain import Columns, columns_of, turn_group, wrist_at
+from arm_ik_service.arm.chain import Columns, columns_of, hand_columns, turn_group, wrist_at
 from arm_ik_service.arm.limits import swing_excess, swing_surely_inside, twist_excess, twist_of
 from arm_ik_service.compiled import Record, compiled, inlined
 from arm_ik_service.geometry.follower import followed_rate
@@ -36,7 +36,7 @@ from arm_ik_service.geometry.scalar import (
 )
 from arm_ik_service.geometry.trigonometry import angle_of, sine_cosine
 from arm_ik_service.ik.conjugate import NEAREST, SOLVED, rotation_error
-from arm_ik_service.ik.swivel import beyond, elbow_side, hand_angles
+from arm_ik_service.ik.swivel import beyond, elbow_side, hand_angles, turn_hand
 
 LONGEST_S = 0.2  # that an elbow takes while the hand rests
 SUDDEN_M_S2 = 3.0  # acceleration of the solve's elbow about the line that is not followed at once ...
@@ -183,9 +183,7 @@ def _take(arm: Record, axis: Vector, hand: Columns, turn: float, most_missed: fl
     if missed < most_missed:
         for i in range(4):
             shown[i] = shoulder[i]
-        shown[6] = clip(pronation, lower[2], upper[2])
-        shown[7] = clip(flexion, lower[3], upper[3])
-        shown[8] = clip(deviation, lower[4], upper[4])
+        turn_hand(chain, shown, (pronation, flexion, deviation))
     return missed
 
 
@@ -200,9 +198,6 @@ def _shoulder_allows(chain: Record, bone: Columns) -> bool:
 @inlined
 def _report(arm: Record, settings: Record, rotation: Columns) -> None:
     """Leave in `arm` how far the hand that is shown is turned from what was asked."""
-    q = arm.shown
-    base = columns_of((q[0], q[1], q[2], q[3]))
-    hand = turn_group(turn_group(base, q[4], q[5], q[6])[2], q[7], q[8], q[9])[2]
-    arm.orientation_error_rad = norm(rotation_error(hand, rotation))
+    arm.orientation_error_rad = norm(rotation_error(hand_columns(arm.shown), rotation))
     if arm.status == SOLVED and arm.orientation_error_rad > 2.0 * settings.orientation_tolerance_rad:
         arm.status = NEAREST

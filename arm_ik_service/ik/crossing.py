@@ -14,16 +14,17 @@ import math
 from typing import Any
 
 from arm_ik_service.arm import tangent
-from arm_ik_service.arm.chain import Columns, columns_of, forearm_columns, turn_group, wrist_at
+from arm_ik_service.arm.chain import Columns, columns_of, forearm_columns, hand_columns, turn_group, wrist_at
 from arm_ik_service.arm.configuration import difference, integrate, read_configuration, store_configuration
 from arm_ik_service.arm.tangent import Tangent
 from arm_ik_service.compiled import Record, compiled, inlined
-from arm_ik_service.geometry.scalar import Vector, clip, norm, subtract
+from arm_ik_service.geometry.follower import followed_rate
+from arm_ik_service.geometry.scalar import Vector, norm, subtract
 from arm_ik_service.ik.any_rotation import POSITION_ALONE, STUCK_M
 from arm_ik_service.ik.conjugate import NEAREST, converge, rotation_error
 from arm_ik_service.ik.jacobian import NO_WRENCH, store_wrench
 from arm_ik_service.ik.pace import CATCH_UP_M_S, go_part_of_the_way
-from arm_ik_service.ik.swivel import hand_angles, nearest_with_room
+from arm_ik_service.ik.swivel import hand_angles, nearest_with_room, turn_hand
 
 LEAP_M = 0.08  # of the solve's elbow in a frame, beyond twice what its hand moves: no elbow goes there at once
 TIME_S = 0.08  # in which most of the way is made
@@ -43,11 +44,12 @@ def cross_over(arm: Record, settings: Record, asked: Vector, rotation: Columns, 
     chain, went_on = arm.chain, arm.crosses
     missed, leapt = arm.missed_m > STUCK_M, _leapt(chain, arm.goal, arm.shown)
     goal_before, goal = read_configuration(arm.goal), read_configuration(arm.shown)
-    goals_way_m = norm(subtract(wrist_at(chain, arm.shown), wrist_at(chain, arm.goal)))
-    store_configuration(arm.goal, goal)
     if settings.elbow_lag_m == 0.0 or arm.started == 0 or not (missed or leapt or went_on != THERE):
+        store_configuration(arm.goal, goal)
         arm.crosses = THERE
         return
+    goals_way_m = norm(subtract(wrist_at(chain, arm.shown), wrist_at(chain, arm.goal)))
+    store_configuration(arm.goal, goal)
     # a goal that jumps about, or has just leapt, has no motion to go along with
     still = missed or leapt
     gap = difference(goal if still else goal_before, read_configuration(arm.before))
@@ -57,9 +59,7 @@ def cross_over(arm: Record, settings: Record, asked: Vector, rotation: Columns, 
             rate = tangent.subtract(rate, tangent.scale(1.0 / dt_s, difference(goal_before, goal)))
     else:
         rate = tangent.read(arm.crossing_rate) if went_on == CLOSES else tangent.STILL
-    stiff = 2.0 * dt_s / TIME_S
-    rate = tangent.subtract(rate, tangent.scale(stiff * stiff / dt_s, gap))
-    rate = tangent.scale(1.0 / (1.0 + 2.0 * stiff + stiff * stiff), rate)
+    rate = _closing(rate[0], gap[0], dt_s), _closing(rate[1], gap[1], dt_s), _closing(rate[2], gap[2], dt_s)
     gap = tangent.add(gap, tangent.scale(dt_s, rate))
     tangent.store(arm.crossing_rate, rate)
     arm.crosses = LOST if missed else CLOSES
@@ -91,6 +91,16 @@ def _leapt(chain: Record, before: Any, after: Any) -> bool:
 
 
 @inlined
+def _closing(rate: Vector, gap: Vector, dt_s: float) -> Vector:
+    """Rate [rad/s] of three joints' gap in the next frame."""
+    return (
+        followed_rate(rate[0], -gap[0], TIME_S, dt_s),
+        followed_rate(rate[1], -gap[1], TIME_S, dt_s),
+        followed_rate(rate[2], -gap[2], TIME_S, dt_s),
+    )
+
+
+@inlined
 def _size(t: Tangent) -> float:
     return norm(t[0]) + norm(t[1]) + norm(t[2])
 
@@ -116,20 +126,15 @@ def _hold_hand(arm: Record, allowed_m: float) -> None:
 @inlined
 def _turn_hand(arm: Record) -> None:
     """Turn the shown hand as that of the goal, as far as the wrist goes; its axial play stays as it is."""
-    q, goal, lower, upper = arm.shown, arm.goal, arm.chain.lower, arm.chain.upper
-    x, y, z = turn_group(forearm_columns(goal), goal[7], goal[8], goal[9] - q[9])[2]
+    q, goal = arm.shown, arm.goal
+    hand = turn_group(forearm_columns(goal), goal[7], goal[8], goal[9] - q[9])[2]
     base = columns_of((q[0], q[1], q[2], q[3]))
-    pronation, flexion, deviation = hand_angles(turn_group(base, q[4], q[5], 0.0)[2], (x, y, z))
-    q[6] = clip(pronation, lower[2], upper[2])
-    q[7] = clip(flexion, lower[3], upper[3])
-    q[8] = clip(deviation, lower[4], upper[4])
+    turn_hand(arm.chain, q, hand_angles(turn_group(base, q[4], q[5], 0.0)[2], hand))
 
 
 @inlined
 def _report(arm: Record, asked: Vector, rotation: Columns) -> None:
     """Leave in `arm` how far the hand that is shown is from what was asked."""
-    q = arm.shown
-    arm.position_error_m = norm(subtract(asked, wrist_at(arm.chain, q)))
-    hand = turn_group(forearm_columns(q), q[7], q[8], q[9])[2]
-    arm.orientation_error_rad = norm(rotation_error(hand, rotation))
+    arm.position_error_m = norm(subtract(asked, wrist_at(arm.chain, arm.shown)))
+    arm.orientation_error_rad = norm(rotation_error(hand_columns(arm.shown), rotation))
     arm.status = NEAREST

@@ -118,6 +118,13 @@ def hand_angles(forearm: Columns, hand: Columns) -> tuple[float, float, float]:
 
 
 @inlined
+def turn_hand(chain: Record, configuration: Any, angles: Vector) -> None:
+    """Write pronation, wrist flexion and deviation into a configuration (10,), as far as the joints go."""
+    for i in range(3):
+        configuration[6 + i] = clip(angles[i], chain.lower[2 + i], chain.upper[2 + i])
+
+
+@inlined
 def from_above(pronation: float) -> float:
     """Return a pronation in (-pi, pi] as one in (-pi/2, 3 pi/2]: the range of the joint lies well inside that."""
     return pronation + 2.0 * math.pi if pronation < -0.5 * math.pi else pronation
@@ -161,7 +168,5 @@ def take(chain: Record, posture: Posture, configuration: Any) -> None:
         configuration[i] = q[i]
     configuration[4] = clip(flexion, chain.lower[0], chain.upper[0])
     configuration[5] = clip(0.0, chain.lower[1], chain.upper[1])
-    configuration[6] = clip(pronation, chain.lower[2], chain.upper[2])
-    configuration[7] = clip(wrist_flexion, chain.lower[3], chain.upper[3])
-    configuration[8] = clip(deviation, chain.lower[4], chain.upper[4])
+    turn_hand(chain, configuration, (pronation, wrist_flexion, deviation))
     configuration[9] = clip(0.0, chain.lower[5], chain.upper[5])

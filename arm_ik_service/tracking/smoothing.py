@@ -56,16 +56,17 @@ def _noise(channel: Record, dt_s: float) -> float:
 
 
 @compiled
-def _adaptive_gain(channel: Record, filters: Any, level: int, away: float, dt_s: float) -> float:
-    """Update slope and noise; the gain to follow a sample with that is `away` [m, rad] from the output."""
+def _adaptive_gain(channel: Record, filters: Any, level: int, dt_s: float) -> float:
+    """Update slope and noise; the gain to follow a sample with that is `channel.away` from the output."""
+    away = g.norm(g.vector(channel.away))
     rest_hz, rise, threshold, longest, noises = filters[level]
     channel.restarted_s += dt_s
     follow = max(_gain(SLOPE_HZ, dt_s), dt_s / channel.restarted_s)  # at first the mean of what there is
     slope = g.lerp(g.vector(channel.slope), g.vector(channel.rate), follow)
     g.store(channel.slope, slope)
-    noise = _noise(channel, dt_s)
     if level == OFF:
         return 1.0
+    noise = _noise(channel, dt_s)
     if away < NOWHERE:
         return 0.0
     leash = max(min(longest, noises * noise), NOWHERE) if noises < math.inf else longest
@@ -82,8 +83,8 @@ def restart(channel: Record, value: Any) -> None:
     """Forget what was before `value`, which passes as it is."""
     g.store(channel.measured, value)
     g.store(channel.smooth, value)
-    g.store(channel.rate, (0.0, 0.0, 0.0))
-    g.store(channel.slope, (0.0, 0.0, 0.0))
+    for tangent in (channel.away, channel.rate, channel.slope):
+        g.store(tangent, (0.0, 0.0, 0.0))
     channel.noise_squared, channel.samples, channel.restarted_s = 0.0, 0, 0.0
 
 
@@ -92,8 +93,8 @@ def note_position(channel: Record, position: Vector, since_s: float, dt_s: float
     """Take note of a position [m] `since_s` after the last one, and of what part of the way to it the filter goes."""
     g.store(channel.rate, g.scale(1.0 / since_s, g.subtract(position, g.vector(channel.measured))))
     g.store(channel.measured, position)
-    away = g.norm(g.subtract(position, g.vector(channel.smooth)))
-    channel.gain = _adaptive_gain(channel, POSITION_FILTERS, level, away, dt_s)
+    g.store(channel.away, g.subtract(position, g.vector(channel.smooth)))
+    channel.gain = _adaptive_gain(channel, POSITION_FILTERS, level, dt_s)
 
 
 @compiled
@@ -102,15 +103,14 @@ def note_rotation(channel: Record, rotation: Quaternion, since_s: float, dt_s: f
     turned = g.log(g.multiply(rotation, g.conjugate(g.quaternion(channel.measured))))
     g.store(channel.rate, g.scale(1.0 / since_s, turned))
     g.store(channel.measured, rotation)
-    away = g.norm(g.log(g.multiply(rotation, g.conjugate(g.quaternion(channel.smooth)))))
-    channel.gain = _adaptive_gain(channel, ROTATION_FILTERS, level, away, dt_s)
+    g.store(channel.away, g.log(g.multiply(rotation, g.conjugate(g.quaternion(channel.smooth)))))
+    channel.gain = _adaptive_gain(channel, ROTATION_FILTERS, level, dt_s)
 
 
 @inlined
 def smooth_position(channel: Record, gain: float) -> Vector:
     """Go a part of the way from `channel.smooth` to what was measured [m]."""
-    measured = g.vector(channel.measured)
-    smooth = g.subtract(measured, g.scale(1.0 - gain, g.subtract(measured, g.vector(channel.smooth))))
+    smooth = g.subtract(g.vector(channel.measured), g.scale(1.0 - gain, g.vector(channel.away)))
     g.store(channel.smooth, smooth)
     return smooth
 
@@ -118,8 +118,7 @@ def smooth_position(channel: Record, gain: float) -> Vector:
 @inlined
 def smooth_rotation(channel: Record, gain: float) -> Quaternion:
     """Go a part of the way from `channel.smooth` to the rotation that was measured."""
-    measured = g.quaternion(channel.measured)
-    away = g.log(g.multiply(measured, g.conjugate(g.quaternion(channel.smooth))))
-    smooth = g.normalized(g.multiply(g.exp(g.scale(gain - 1.0, away)), measured))
+    back = g.exp(g.scale(gain - 1.0, g.vector(channel.away)))
+    smooth = g.normalized(g.multiply(back, g.quaternion(channel.measured)))
     g.store(channel.smooth, smooth)
     return smooth

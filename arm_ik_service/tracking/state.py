@@ -30,6 +30,7 @@ def _channel(components: int) -> np.dtype[np.void]:
             ("suspected_for_s", np.float64),  # how long such samples have agreed with each other
             ("suspects", np.int64),  # how many they are
             ("smooth", *value),  # the 1 Euro filter's
+            ("away", *tangent),  # from there to the sample
             ("gain", np.float64),  # what part of the way to the sample it wants to go in this frame; 0 if there is none
             ("slope", *tangent),  # its estimate of the rate
             ("noise_squared", np.float64),  # its estimate of the data's noise, from ...
