@@ -6,10 +6,12 @@ time lies on either side; the steps shrink as time goes by. Only the samples cou
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from arm_ik_service.body.profile import BodyMeasures, Profile
-from arm_ik_service.compiled import Record, compiled, record_dtype
+from arm_ik_service.compiled import Record, compiled, inlined, record_dtype
 from arm_ik_service.geometry import scalar as g
 
 EYES_PER_STATURE = 0.936  # eye height over stature: Drillis & Contini (1966)
@@ -30,6 +32,7 @@ OVERSTRETCHED_TIME = 0.006  # share of the time that a hand may be farther away
 LENGTH_PER_S = 0.3  # speed of the estimate, as a part of the length
 LENGTH_SETTLES_AFTER_S = 30.0
 OUT_OF_HAND = 1.45  # a hand so many arm lengths away has let go of the controller
+GROWS_IN_S = 0.3  # the time in which the body follows the estimates
 LENGTH_RANGE = (0.94, 1.3)  # of what stature says: people rarely stretch fully, so little is taken away
 
 LEARNING = record_dtype(
@@ -53,6 +56,8 @@ def initialise_learning(body: Record, profile: Profile) -> None:
     learning["eyes"] = EYES_PER_STATURE * measures.stature_m
     learning["length"] = 1.0
     body["stature"] = measures.stature_m
+    if learning["arms"]:
+        body["arm_length"] = ARM_PER_STATURE * measures.stature_m
 
 
 def resume_learning(body: Record, upper_arm_m: float, forearm_m: float, half_width_m: float) -> None:
@@ -81,23 +86,36 @@ def _learn_stature(body: Record, eyes_m: float, elapsed_s: float) -> None:
     pace = EYES_M_S * elapsed_s / (1.0 + learning.watched_s / EYES_SETTLE_AFTER_S)
     learning.eyes += pace * (EYES_PERCENTILE if eyes_m > learning.eyes else EYES_PERCENTILE - 1.0)
     learning.eyes = g.clip(learning.eyes, STANDING_EYES_M[0], STANDING_EYES_M[1])
-    body.stature = learning.eyes / EYES_PER_STATURE
-    if learning.width:
-        body.half_width = HALF_WIDTH_PER_STATURE * body.stature
 
 
 @compiled
-def _learn_length(body: Record, k: int, elapsed_s: float) -> None:
+def _learn_length(body: Record, k: int, length_m: float, elapsed_s: float) -> None:
     side = -1.0 if k == 0 else 1.0
     lateral = g.rotate(g.quaternion(body.chest_rotation), (side * body.half_width, 0.0, 0.0))
     shoulder = g.add(g.vector(body.chest_position), lateral)
-    ratio = g.norm(g.subtract(g.vector(body.wrists[k].position), shoulder)) / body.arm_length
+    ratio = g.norm(g.subtract(g.vector(body.wrists[k].position), shoulder)) / length_m
     if ratio > OUT_OF_HAND:
         return
     learning = body.learning
     pace = LENGTH_PER_S * elapsed_s / (1.0 + learning.watched_s / LENGTH_SETTLES_AFTER_S)
     learning.length += pace * (1.0 - OVERSTRETCHED_TIME if ratio > OVERSTRETCHED else -OVERSTRETCHED_TIME)
     learning.length = g.clip(learning.length, LENGTH_RANGE[0], LENGTH_RANGE[1])
+
+
+@inlined
+def _stature(body: Record) -> float:
+    """Estimate of the stature [m] as it is by now: what is learnt, or what the profile says."""
+    return float(body.learning.eyes / EYES_PER_STATURE)
+
+
+@inlined
+def _grow(body: Record, elapsed_s: float) -> None:
+    """Let the body come to its estimates smoothly: those go up or down a step a frame, and arms would tremble by it."""
+    learning, share = body.learning, 1.0 - math.exp(-elapsed_s / GROWS_IN_S)
+    body.stature += share * (_stature(body) - body.stature)
+    if learning.stature and learning.width:
+        body.half_width = HALF_WIDTH_PER_STATURE * body.stature
+    body.arm_length += share * (learning.length * ARM_PER_STATURE * _stature(body) - body.arm_length)
 
 
 @compiled
@@ -111,8 +129,8 @@ def learn(body: Record, tracking: Record, elapsed_s: float) -> None:
         _learn_stature(body, eyes_m, elapsed_s)
     for k in range(2):
         if tracking.hands[k].position_age_s == 0.0:
-            _learn_length(body, k, elapsed_s)
+            _learn_length(body, k, learning.length * ARM_PER_STATURE * _stature(body), elapsed_s)
     learning.watched_s += elapsed_s
-    body.arm_length = learning.length * ARM_PER_STATURE * body.stature
+    _grow(body, elapsed_s)
     body.upper_arm = UPPER_ARM_PER_ARM * body.arm_length
     body.forearm = body.arm_length - body.upper_arm

@@ -213,6 +213,13 @@ def test_longer_arms_than_stature_says_are_learnt_from_reach() -> None:
     assert np.abs(np.diff(learnt["arm_length"])).max() < 0.01
 
 
+@pytest.mark.parametrize("name", ["arm_length", "half_width"])
+def test_nobody_trembles_while_they_are_measured(name: str) -> None:
+    lengths = run(lively(10.0, PEOPLE[1]).frames).body[name]
+    assert np.ptp(lengths) > 0.005
+    assert np.abs(np.diff(lengths, 2)).max() < 3e-4
+
+
 def test_measures_that_are_stated_are_never_touched() -> None:
     body = BodyMeasures(stature_m=1.7, upper_arm_m=0.29, forearm_m=0.25, shoulder_width_m=0.35)
     made = run(lively(20.0, PEOPLE[1]).frames, profile=Profile(body=body)).body
