@@ -20,6 +20,7 @@ from arm_ik_service.body.profile import BodyMeasures, Profile
 from arm_ik_service.body.shoulders import STERNOCLAVICULAR
 from arm_ik_service.body.state import BODY
 from arm_ik_service.body.step import initialise_body, step_body
+from arm_ik_service.body.trunk import give_way
 from arm_ik_service.compiled import compiled, record_dtype
 from arm_ik_service.geometry.batch import Array
 from arm_ik_service.ik.state import ARM
@@ -87,6 +88,7 @@ def step_batch(
             step_arm(arm, row.body.targets[side], row.tracking.dt_s, settings.solver)
             if task.ahead_s > 0.0:
                 show_ahead(arm, task.ahead_s)
+        give_way(row.body, row.tracking, row.arms, row.tracking.interval_s)
         if settings.body.learns:
             learn_grip(row.body, row.tracking, row.arms, row.tracking.interval_s)
         write_output(outputs[k], row.tracking, row.body, row.arms)
@@ -150,7 +152,7 @@ class Avatars:
                 return False
         for arm, q in zip(row.arms, configurations, strict=True):
             arm["configuration"] = q
-            arm["shown"] = arm["goal"] = q
+            arm["shown"] = q
             arm["started"] = 1  # not a first frame: it would choose the elbow afresh
         left, right = state.left.bones, state.right.bones
         resume_learning(

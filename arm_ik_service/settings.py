@@ -53,7 +53,7 @@ class SolverSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     predict_s: Annotated[float, Meta(ge=0.0, le=0.1)] = 0.0
     swivel_speed_rad_s: Annotated[float, Meta(ge=0.0)] = 4.0  # the elbow about the arm's line, for comfort alone
     swivel_acceleration_rad_s2: Annotated[float, Meta(gt=0.0)] = 80.0  # so that joint velocities do not jump
-    swivel_time_s: Annotated[float, Meta(ge=0.0)] = 0.08  # in which it covers most of the way to the comfortable place
+    swivel_time_s: Annotated[float, Meta(ge=0.0)] = 0.09  # in which it covers most of the way to the comfortable place
     # what is shown follows the solve's elbow in the time in which the hand moves on by so much; 0: it is the solve's
     elbow_lag_m: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.03
 

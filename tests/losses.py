@@ -104,9 +104,10 @@ def _frames_of(take: Take) -> Iterator[RecordedFrame]:
 
 @dataclass(frozen=True)
 class Published:
-    """What was answered to every frame: wrists (N, 2, 3) [m] in world axes."""
+    """What was answered to every frame, in world axes: wrists (N, 2, 3) [m], chests (N, 7)."""
 
     wrists: Array
+    chests: Array
     error_m: Array  # (N, 2) from what was asked
 
 
@@ -119,6 +120,7 @@ def publish(take: Take, profile: Profile, settings: Settings | None = None) -> P
     arms = [(state.left, state.right) for state in answers]
     return Published(
         np.array([[arm.bones.hand.position for arm in both] for both in arms]),
+        np.array([[*state.chest.position, *state.chest.orientation] for state in answers]),
         np.array([[arm.position_error_m for arm in both] for both in arms]),
     )
 

@@ -14,10 +14,11 @@ from arm_ik_service.arm.model import ArmModel
 from arm_ik_service.body.state import TARGET
 from arm_ik_service.compiled import compiled
 from arm_ik_service.geometry import batch
-from arm_ik_service.ik.crossing import LEAP_M
 from arm_ik_service.ik.state import new_arm
 from arm_ik_service.ik.step import step_arm
 from arm_ik_service.settings import SolverSettings, to_record
+
+LEAP_M = 0.08  # of an elbow in a frame, beyond twice what its hand moves: no elbow goes there at once
 
 Array = npt.NDArray[np.float64]
 Counts = npt.NDArray[np.int64]

@@ -14,9 +14,6 @@ from arm_ik_service.body.report import jerk_rms
 from arm_ik_service.io.session import open_session
 
 JERK_AT_MOST = 1.25  # of either side; wanted is 1.2, met on the machine it was measured on
-# Dancers whose chest, taken from the head, is up to 75 degrees off: one keeps her eyes where they were while she spins.
-# Their arms run into limits that their own did not; how the arm goes on from there hangs on the last bits of a number.
-JERK_KNOWN = {"cmu_salsa_60_01": 2.0, "cmu_salsa_61_02": 3.5}
 
 
 def test_elbows_are_near_the_recorded_ones_and_hardly_less_calm(recordings: Path) -> None:
@@ -36,7 +33,7 @@ def test_elbows_are_near_the_recorded_ones_and_hardly_less_calm(recordings: Path
             errors_m[path.name.split("_")[0]].append(np.linalg.norm(elbows - recorded, axis=1).mean())
             jerk = jerk_rms(truth["t"], elbows) / jerk_rms(truth["t"], recorded)
             jerks.append(jerk)
-            assert jerk <= JERK_KNOWN.get(path.stem, JERK_AT_MOST), (path.name, side)
+            assert jerk <= JERK_AT_MOST, (path.name, side)
     assert len(errors_m) == 5
     assert np.median(jerks) < 1.1
     assert np.mean([np.mean(family) for family in errors_m.values()]) <= 0.056

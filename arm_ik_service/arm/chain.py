@@ -144,6 +144,14 @@ def spin_to_arm(chain: Record, w: Vector) -> Vector:
 
 
 @compiled
+def spin_from_arm(chain: Record, w: Vector) -> Vector:
+    """Undo spin_to_arm."""
+    s = chain.shoulder_from_isb
+    w = rotate((s[0], s[1], s[2], s[3]), w)
+    return (w[0], -w[1], -w[2]) if chain.left else w
+
+
+@compiled
 def hand_to_arm(chain: Record, q: Quaternion) -> Quaternion:
     """Take an OpenXR wrist rotation in shoulder axes to the hand bone's rotation in the right arm's ISB axes."""
     if chain.left:

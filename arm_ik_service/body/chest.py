@@ -22,13 +22,15 @@ PITCH_SHARE = 0.2  # of the head's pitch that the chest takes part in (fit)
 ROLL_SHARE = 0.45  # the same for roll (fit)
 
 # The chest faces along a sum of horizontal directions: the head's, of length 1, and those below. They cannot outweigh
-# it, so the chest never turns its back to the face, wherever the hands are. The elbows tell more than the hands: they
-# hang on the shoulders, and a wrist is rarely bent far, so the hand's own direction shows where its elbow is to 5 cm.
+# it, so no hands turn the chest's back to the face; arms in want of room turn it farther (see body.trunk). The elbows
+# tell more than the hands: they hang on the shoulders, and a wrist is rarely bent far, so the hand's own direction
+# shows where its elbow is to 5 cm.
 ELBOW_IN_WRIST: Vector = (0.0, 0.2, 0.44)  # in arm lengths: a forearm along, for a hand as it is held beside (fit)
 HAND_PULL = 0.1  # from the neck to each hand, in arm lengths, at most 1 (fit)
 ELBOWS_LINE_PULL = 0.75  # perpendicular to the line between the elbows, in arm lengths, at most 1 (fit)
 FOREARMS_TIME_S = 0.03  # by which the elbows trail behind the hands' turning, on the chest (fit)
 FACING_TIME_S = 0.02  # by which the chest trails a steady turn (fit)
+TRUST_TIME_S = 0.15  # in which a lost hand ceases to say where the chest faces, and one that is back begins to
 SURE_FACING = 0.5  # a shorter sum says little about the direction: the chest follows less
 FASTEST_TURN_RAD_S = 25.0  # of a chest; a skater's pirouette is 30, a dancer's 15
 NECK_TIME_S = 0.025  # of the neck's fading memory (fit)
@@ -57,15 +59,25 @@ def _step_forearms(body: Record, yaw: float, elapsed_s: float) -> None:
 
 
 @compiled
+def _trust(body: Record, tracking: Record, elapsed_s: float) -> None:
+    """Update how far each hand is trusted: one that is lost stays behind where the person was."""
+    for k in range(2):
+        seen = 1.0 if tracking.hands[k].position_age_s == 0.0 else 0.0
+        share = 1.0 - math.exp(-elapsed_s / TRUST_TIME_S)
+        body.trust[k] = seen if body.started == 0 else body.trust[k] + share * (seen - body.trust[k])
+
+
+@compiled
 def facing(body: Record, neck: Vector, head: Quaternion, yaw: float) -> Vector:
     """Horizontal direction the chest, now at `yaw`, would face if it had the time; shorter where that is less sure."""
     hands = g.subtract(g.vector(body.wrists[1].position), g.vector(body.wrists[0].position))
     forearms = g.subtract(g.vector(body.forearms[1].at), g.vector(body.forearms[0].at))
     line = g.add(hands, g.rotate(g.rotation_y(yaw), forearms))
-    total = g.add(g.heading(head), _pull(ELBOWS_LINE_PULL, line[2], -line[0], body.arm_length))
+    both = min(body.trust[0], body.trust[1])
+    total = g.add(g.heading(head), _pull(both * ELBOWS_LINE_PULL, line[2], -line[0], body.arm_length))
     for k in range(2):
         away = g.subtract(g.vector(body.wrists[k].position), neck)
-        total = g.add(total, _pull(HAND_PULL, away[0], away[2], body.arm_length))
+        total = g.add(total, _pull(body.trust[k] * HAND_PULL, away[0], away[2], body.arm_length))
     return total
 
 
@@ -76,7 +88,7 @@ def _turn(body: Record, direction: Vector, recentred: float, elapsed_s: float) -
         body.yaw = yaw
         return
     sure = min(g.norm(direction) / SURE_FACING, 1.0)
-    away = sure * g.wrap(yaw - body.yaw - recentred)
+    away = sure * g.wrap(yaw + body.gives.at[1] - body.yaw - recentred)
     body.yaw_rate = followed_rate(body.yaw_rate, away, settled_time(FACING_TIME_S, body.since_s), elapsed_s)
     body.yaw_rate = g.clip(body.yaw_rate, -FASTEST_TURN_RAD_S, FASTEST_TURN_RAD_S)
     turn = recentred + body.yaw_rate * elapsed_s
@@ -106,7 +118,7 @@ def _tilted(body: Record, head: Quaternion, elapsed_s: float) -> Quaternion:
     """Return the rotation of the chest: its yaw, and the part of the head's pitch and roll that it takes."""
     upright = g.rotation_y(body.yaw)
     head_up = g.rotate(g.conjugate(upright), g.rotate(head, g.Y))
-    asked = (ROLL_SHARE * head_up[0], 0.0, PITCH_SHARE * head_up[2])
+    asked = (ROLL_SHARE * head_up[0], 0.0, PITCH_SHARE * head_up[2] + body.gives.at[0])
     if body.started == 0:
         start_at(body.tilt, asked)
     up = g.add(g.Y, follow(body.tilt, asked, TILT_TIME_S, body.since_s, elapsed_s))
@@ -120,6 +132,7 @@ def step_chest(body: Record, tracking: Record, elapsed_s: float) -> None:
     pivot = g.scale(body.arm_length / ARM_LENGTH_OF_FIT, NECK_PIVOT_IN_HEAD)
     neck = g.add(g.vector(body.head_position), g.rotate(head, pivot))
     yaw = g.wrap(body.yaw + tracking.recentred_yaw)
+    _trust(body, tracking, elapsed_s)
     _step_forearms(body, yaw, elapsed_s)
     _turn(body, facing(body, neck, head, yaw), tracking.recentred_yaw, elapsed_s)
     if body.started == 0:  # in the axes that were not known before

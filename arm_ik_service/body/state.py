@@ -19,6 +19,8 @@ TARGET = record_dtype(
         ("rotation", np.float64, (4,)),
         ("linear_velocity", np.float64, (3,)),
         ("angular_velocity", np.float64, (3,)),
+        ("carried_linear_velocity", np.float64, (3,)),  # of the shoulder frame itself in the world, in its axes
+        ("carried_angular_velocity", np.float64, (3,)),
     ]
 )
 BODY = record_dtype(
@@ -44,10 +46,12 @@ BODY = record_dtype(
         # memory
         ("started", np.int64),
         ("since_s", np.float64),  # since the first frame
+        ("trust", np.float64, (2,)),  # in what each hand says of the chest: 1 while it is seen, 0 once it is lost
         ("yaw", np.float64),  # of the chest, about +Y
         ("yaw_rate", np.float64),  # [rad/s] with which it follows
         ("neck", FOLLOWER),  # what the head turns on, in world axes
         ("forearms", FOLLOWER, (2,)),  # from each wrist to its elbow as the hand shows it, in axes that share the yaw
+        ("gives", FOLLOWER),  # rotation vector [rad] by which it gives way to the arms, in its own axes: see body.trunk
         ("tilt", FOLLOWER),  # the chest's up over its y, in axes that share its yaw
         ("recentres", np.int64),  # of tracking, that the memory in world axes was moved along with
         ("learning", LEARNING),

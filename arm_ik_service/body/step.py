@@ -14,6 +14,7 @@ from arm_ik_service.body.state import BODY
 from arm_ik_service.compiled import Record, compiled
 from arm_ik_service.geometry import batch
 from arm_ik_service.geometry import scalar as g
+from arm_ik_service.geometry.scalar import Vector
 
 LONGEST_STEP_S = 0.1  # a gap in the data is not time in which the body was seen to move
 
@@ -49,7 +50,7 @@ def _place_wrist(body: Record, tracking: Record, k: int) -> None:
 
 
 @compiled
-def _set_target(body: Record, k: int, dt_s: float, settings: Record) -> None:
+def _set_target(body: Record, k: int, shoulder_before: Vector, dt_s: float, settings: Record) -> None:
     target, wrist = body.targets[k], body.wrists[k]
     shoulder_from_world = g.conjugate(g.quaternion(body.chest_rotation))
     away = g.subtract(g.vector(wrist.position), g.vector(body.shoulders[k]))
@@ -61,7 +62,10 @@ def _set_target(body: Record, k: int, dt_s: float, settings: Record) -> None:
         rate = 1.0 / dt_s
         moved = g.subtract(position, g.vector(target.position))
         turned = g.log(g.multiply(rotation, g.conjugate(g.quaternion(target.rotation))))
+        carried = g.rotate(shoulder_from_world, g.subtract(g.vector(body.shoulders[k]), shoulder_before))
         g.store(target.linear_velocity, g.scale(rate, moved))
+        g.store(target.carried_linear_velocity, g.scale(rate, carried))
+        g.store(target.carried_angular_velocity, (0.0, body.yaw_rate, 0.0))  # what tilts is slow
         g.store(target.angular_velocity, g.scale(rate, turned))
     body.reach_ratio[k] = ratio
     g.store(target.position, position)
@@ -86,7 +90,8 @@ def step_body(body: Record, tracking: Record, settings: Record) -> None:
             not learns and tracking.hands[k].position_age_s == 0.0 and tracking.head.position_age_s == 0.0
         ):  # both are seen
             settle(body, k, elapsed_s)
+        shoulder_before = g.vector(body.shoulders[k])
         step_shoulder(body, k)
-        _set_target(body, k, dt_s, settings)
+        _set_target(body, k, shoulder_before, dt_s, settings)
     body.since_s += elapsed_s if body.started else 0.0
     body.started = 1

@@ -1,11 +1,14 @@
 """The arm as it is shown: its elbow follows the solve's about the line from shoulder to wrist, calmly.
 
-The solve answers every frame for itself. Where a joint's limit is in the way its elbow starts, stops and leaps within a
-frame, as no elbow of a person does. Two things make it calm. What is sudden is not followed: an acceleration beyond
-SUDDEN_M_S2 opens a gap to the solve's elbow that closes without haste. And what is left is followed in about the time
-in which the hand moves on by `elbow_lag_m`: an elbow hardly moves while a hand only turns in its place, and at once
-when the hand goes somewhere (both as measured on recorded arms). The hand itself stays where it is; it is turned less
-than asked for as long as the wrist would be beyond its limits.
+The solve answers every frame for itself. Where limits are in the way its elbow starts and stops within a frame, as no
+elbow of a person does, or leaps to another posture. Two things make it calm. What is sudden is not followed: an
+acceleration beyond SUDDEN_M_S2 opens a gap to the solve's elbow that closes without haste. And what is left is followed
+in about the time in which the hand moves on by `elbow_lag_m`: an elbow hardly moves while a hand only turns in its
+place, and at once when the hand goes somewhere (both as measured on recorded arms).
+
+The hand stays where it is. It is turned less than asked for as long as the wrist would be beyond its limits, by little
+where the elbow can come nearer to the solve's for it. An elbow that would have to leap for the hand's sake does not:
+it goes its way along the shoulder's limits, and the hand is kept as near to its place as they let it.
 
 The solve does not know what is shown, so nothing can swing up between the two. The elbow's turn is measured against
 the line's own motion (parallel transport), which has no preferred direction and therefore no pole.
@@ -14,13 +17,18 @@ the line's own motion (parallel transport), which has no preferred direction and
 from __future__ import annotations
 
 import math
+from typing import Any
 
+from arm_ik_service.arm import tangent
 from arm_ik_service.arm.chain import Columns, columns_of, hand_columns, turn_group, wrist_at
-from arm_ik_service.arm.limits import swing_excess, swing_surely_inside, twist_excess, twist_of
+from arm_ik_service.arm.configuration import difference, integrate, read_configuration, store_configuration
+from arm_ik_service.arm.limits import clamp_shoulder, swing_excess, swing_surely_inside, twist_excess, twist_of
 from arm_ik_service.compiled import Record, compiled, inlined
 from arm_ik_service.geometry.follower import followed_rate
 from arm_ik_service.geometry.scalar import (
+    Quaternion,
     Vector,
+    add,
     between,
     clip,
     cross,
@@ -35,25 +43,33 @@ from arm_ik_service.geometry.scalar import (
     wrap,
 )
 from arm_ik_service.geometry.trigonometry import angle_of, sine_cosine
-from arm_ik_service.ik.conjugate import NEAREST, SOLVED, rotation_error
+from arm_ik_service.ik.any_rotation import POSITION_ALONE, STUCK_M
+from arm_ik_service.ik.conjugate import NEAREST, SOLVED, converge, rotation_error
+from arm_ik_service.ik.jacobian import NO_WRENCH, store_wrench
+from arm_ik_service.ik.pace import carried_way, go_part_of_the_way, most_way_m
 from arm_ik_service.ik.swivel import beyond, elbow_side, hand_angles, turn_hand
 
 LONGEST_S = 0.2  # that an elbow takes while the hand rests
 SUDDEN_M_S2 = 3.0  # acceleration of the solve's elbow about the line that is not followed at once ...
-SUDDEN_TIME_S = 0.1  # ... but in about this time
+SUDDEN_TIME_S = 0.07  # ... but in about this time
 MOST_M_S2 = 20.0  # acceleration about the line of the elbow shown
 SMALLEST_LEVER_M = 0.02  # of the elbow about the line, for both: nobody sees a straight arm turn
-FASTEST_RAD_S = 20.0  # about the line; what is faster is a leap, which leaves no swing behind
+FASTEST_RAD_S = 20.0  # about the line; what is faster is a leap, which is not followed and leaves no swing behind
 STEP_M = 0.02  # of an elbow in a frame that may be made for the wrist's sake alone
-LARGEST_RAD = 0.3  # by which an elbow comes after the solve's: from farther away there may be no way
+LARGEST_RAD = 3.0  # by which an elbow comes after the solve's: beyond half a turn it comes from the other side
 MOST_MISSED_RAD2 = 0.12**2  # of the hand's rotation, squared, for the elbow's sake
 UNSEEN_RAD = 1e-5  # a turn that is not worth the work
+ELBOW_M_S = 4.0  # speed of an elbow beyond twice its hand's, where limits let it through that held it up until then
+ITERATIONS = 3  # a frame, for a hand whose elbow goes its own way: so few that they do not make it leap after all
 PARTS, HALVINGS = 8, 3  # tries to find how much of a turn the joints allow
 
 
 @compiled
-def calm(arm: Record, settings: Record, rotation: Columns, dt_s: float) -> None:
-    """Write to `arm.shown` the configuration with its elbow where it is to be seen; `rotation` is asked of the hand."""
+def calm(arm: Record, settings: Record, asked: Vector, rotation: Columns, dt_s: float) -> None:
+    """Write to `arm.shown` the configuration with its elbow where it is to be seen, one frame after `arm.before`.
+
+    `asked` and `rotation` are asked of the hand.
+    """
     chain, q = arm.chain, arm.configuration
     for i in range(10):
         arm.shown[i] = q[i]
@@ -65,7 +81,7 @@ def calm(arm: Record, settings: Record, rotation: Columns, dt_s: float) -> None:
     side = elbow_side(axis, upper_arm)
     if arm.calm_started == 0:
         arm.calm_started, arm.calm_turn, arm.calm_speed = 1, 0.0, 0.0
-        arm.calm_gap, arm.calm_gap_rate = 0.0, 0.0
+        arm.calm_gap, arm.calm_gap_rate, arm.calm_astray = 0.0, 0.0, 0
     else:
         came_from = rotate(between(vector(arm.calm_axis), axis), vector(arm.calm_side))
         turned = angle_of(dot(cross(came_from, side), axis), dot(came_from, side))
@@ -79,14 +95,19 @@ def calm(arm: Record, settings: Record, rotation: Columns, dt_s: float) -> None:
         turn, missed = clip(wanted, -LARGEST_RAD, LARGEST_RAD), 0.0
         if abs(turn) > UNSEEN_RAD:
             # where the wrist has it come nearer, it comes no faster than the solve's elbow goes, or a little
-            most = max(abs(turned), abs(to_go + turn), STEP_M / lever_m)
-            turn, missed = _turned(arm, axis, upper_arm, turn, clip(to_go, -most, most) - to_go)
+            most = max(min(abs(turned), FASTEST_RAD_S * dt_s), abs(to_go + turn), STEP_M / lever_m)
+            turn, missed = _turned(arm, settings, axis, upper_arm, turn, clip(to_go, -most, most) - to_go)
         if turn != wanted:
             speed = (to_go + turn) / dt_s
             arm.calm_speed = speed if abs(speed) < FASTEST_RAD_S else 0.0
         arm.calm_turn = turn
+        held = _hold_elbow(arm, dt_s)
+        if held or missed == math.inf or arm.calm_astray == 1:
+            _hold_hand(arm, wrist, dt_s)
+            off_m = norm(subtract(wrist_at(chain, arm.shown), wrist))
+            arm.calm_astray, missed = 1 if off_m > STUCK_M else 0, math.inf
         if missed > 0.0:
-            _report(arm, settings, rotation)
+            _report(arm, settings, asked, rotation)
     store(arm.calm_wrist, wrist)
     store(arm.calm_axis, axis)
     store(arm.calm_side, side)
@@ -121,11 +142,13 @@ def _follow(arm: Record, to_go: float, time_s: float, most: float, dt_s: float) 
 
 
 @compiled
-def _turned(arm: Record, axis: Vector, upper_arm: Columns, turn: float, nearer: float) -> tuple[float, float]:
-    """Turn the shown arm about the line, past its hand, or as much less, down to `nearer`, as its wrist wants it.
+def _turned(
+    arm: Record, settings: Record, axis: Vector, upper_arm: Columns, turn: float, nearer: float
+) -> tuple[float, float]:
+    """Turn the shown arm about the line, past its hand, or as much less, down to `nearer`, as shoulder and wrist want.
 
-    The shoulder has its way in any case. Returns how far [rad], and the square of what is missed of the hand's
-    rotation [rad^2].
+    Returns how far [rad], and the square of what is missed of the hand's rotation [rad^2], infinity where its place may
+    be missed too.
     """
     q = arm.configuration
     hand = turn_group(turn_group(upper_arm, q[4], q[5], q[6])[2], q[7], q[8], 0.0)[2]  # its axial play stays
@@ -134,8 +157,9 @@ def _turned(arm: Record, axis: Vector, upper_arm: Columns, turn: float, nearer: 
         return turn, missed
     allowed, least, refused = _first_allowed(arm, axis, hand, turn, nearer, MOST_MISSED_RAD2)
     if least == math.inf:
-        allowed, least, refused = _first_allowed(arm, axis, hand, nearer, 0.0, math.inf)
-        return allowed, least
+        if nearer != 0.0:
+            _go_on(arm, settings, axis, hand, nearer)
+        return nearer, math.inf
     for _ in range(HALVINGS):
         tried = 0.5 * (allowed + refused)
         missed = _take(arm, axis, hand, tried, MOST_MISSED_RAD2)
@@ -171,8 +195,7 @@ def _take(arm: Record, axis: Vector, hand: Columns, turn: float, most_missed: fl
     Returns the square of what it misses or would miss; infinity where the shoulder forbids it.
     """
     chain, q, shown = arm.chain, arm.configuration, arm.shown
-    s, c = sine_cosine(0.5 * turn)
-    shoulder = multiply((s * axis[0], s * axis[1], s * axis[2], c), (q[0], q[1], q[2], q[3]))
+    shoulder = _shoulder_turned(q, axis, turn)
     base = columns_of(shoulder)
     if not _shoulder_allows(chain, base):
         return math.inf
@@ -187,6 +210,65 @@ def _take(arm: Record, axis: Vector, hand: Columns, turn: float, most_missed: fl
     return missed
 
 
+@compiled
+def _go_on(arm: Record, settings: Record, axis: Vector, hand: Columns, turn: float) -> None:
+    """Turn the shown arm about the line as far as its shoulder goes, and bring its hand back as near as can be."""
+    chain, work, q, shown = arm.chain, arm.calm_work, arm.configuration, arm.shown
+    shoulder = clamp_shoulder(chain, _shoulder_turned(q, axis, turn))
+    for i in range(4):
+        shown[i] = shoulder[i]
+    store_wrench(work.pull, NO_WRENCH)
+    lam = POSITION_ALONE * settings.rotation_weight_m * settings.rotation_weight_m
+    tolerance_m, any_turn = settings.position_tolerance_m, 2.0 * math.pi
+    converge(chain, work, shown, wrist_at(chain, q), hand, ITERATIONS, lam, tolerance_m, any_turn, 0)
+    _turn_hand(chain, shown, hand)
+
+
+@inlined
+def _turn_hand(chain: Record, shown: Any, hand: Columns) -> None:
+    """Turn a hand as far as it goes towards given axes; its axial play stays as it is."""
+    base = columns_of((shown[0], shown[1], shown[2], shown[3]))
+    turn_hand(chain, shown, hand_angles(turn_group(base, shown[4], shown[5], 0.0)[2], hand))
+
+
+@inlined
+def _shoulder_turned(configuration: Any, axis: Vector, turn: float) -> Quaternion:
+    """Rotation of the upper arm of a configuration (10,) turned about an axis [rad]."""
+    s, c = sine_cosine(0.5 * turn)
+    q = (configuration[0], configuration[1], configuration[2], configuration[3])
+    return multiply((s * axis[0], s * axis[1], s * axis[2], c), q)
+
+
+@inlined
+def _hold_elbow(arm: Record, dt_s: float) -> bool:
+    """Let the shown elbow go no faster than an elbow does: all joints go part of the way. Returns whether it would."""
+    chain, before, shown = arm.chain, arm.before, arm.shown
+    start = columns_of((before[0], before[1], before[2], before[3]))[1]
+    end = columns_of((shown[0], shown[1], shown[2], shown[3]))[1]
+    way_m, allowed_m = chain.upper_arm_m * norm(subtract(end, start)), ELBOW_M_S * dt_s
+    if way_m <= allowed_m:
+        return False
+    allowed_m += 2.0 * norm(subtract(wrist_at(chain, shown), wrist_at(chain, before)))
+    if way_m <= allowed_m:
+        return False
+    goal = read_configuration(shown)
+    motion = difference(read_configuration(before), goal)
+    store_configuration(shown, integrate(chain, read_configuration(before), tangent.scale(allowed_m / way_m, motion)))
+    return True
+
+
+@inlined
+def _hold_hand(arm: Record, solves: Vector, dt_s: float) -> None:
+    """Let the shown hand go no farther in a frame than it may, on its way back to where the solve has it."""
+    chain, before = arm.chain, wrist_at(arm.chain, arm.before)
+    carried = carried_way(arm, before, dt_s)
+    way_m = norm(add(subtract(wrist_at(chain, arm.shown), before), carried))
+    allowed_m = most_way_m(arm, carried, vector(arm.calm_wrist), solves, dt_s)
+    if way_m > allowed_m:
+        start, end = read_configuration(arm.before), read_configuration(arm.shown)
+        go_part_of_the_way(chain, start, end, carried, way_m, allowed_m, arm.shown)
+
+
 @inlined
 def _shoulder_allows(chain: Record, bone: Columns) -> bool:
     twist, height = twist_of(bone), -bone[1][1]
@@ -196,8 +278,10 @@ def _shoulder_allows(chain: Record, bone: Columns) -> bool:
 
 
 @inlined
-def _report(arm: Record, settings: Record, rotation: Columns) -> None:
-    """Leave in `arm` how far the hand that is shown is turned from what was asked."""
+def _report(arm: Record, settings: Record, asked: Vector, rotation: Columns) -> None:
+    """Leave in `arm` how far the hand that is shown is from what was asked."""
+    arm.position_error_m = norm(subtract(asked, wrist_at(arm.chain, arm.shown)))
     arm.orientation_error_rad = norm(rotation_error(hand_columns(arm.shown), rotation))
-    if arm.status == SOLVED and arm.orientation_error_rad > 2.0 * settings.orientation_tolerance_rad:
+    met = arm.position_error_m <= 2.0 * settings.position_tolerance_m
+    if arm.status == SOLVED and not (met and arm.orientation_error_rad <= 2.0 * settings.orientation_tolerance_rad):
         arm.status = NEAREST

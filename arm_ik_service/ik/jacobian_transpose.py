@@ -123,6 +123,8 @@ def _track(
     arm, setting = arms[0], settings[0]
     chain, work = arm.chain, arm.work
     arm.swivel_speed, arm.escape, arm.steady = 0.0, 0.0, 0
+    store(arm.carried, (0.0, 0.0, 0.0))
+    store(arm.carried_spin, (0.0, 0.0, 0.0))
     arm.position_error_m, work.position_error_m = 0.0, 0.0
     for i in range(len(arm.habit)):
         arm.habit[i] = 0.0

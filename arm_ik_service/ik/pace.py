@@ -13,8 +13,8 @@ from arm_ik_service.arm.configuration import (
     read_configuration,
     store_configuration,
 )
-from arm_ik_service.compiled import Record, compiled
-from arm_ik_service.geometry.scalar import Vector, add, clip, norm, scale, subtract, vector, wrap
+from arm_ik_service.compiled import Record, compiled, inlined
+from arm_ik_service.geometry.scalar import Vector, add, clip, cross, norm, scale, subtract, vector, wrap
 from arm_ik_service.ik.any_rotation import STUCK_M, reach_with_any_rotation
 from arm_ik_service.ik.conjugate import NEAREST, rotation_error
 from arm_ik_service.ik.jacobian import jacobian_at
@@ -48,6 +48,22 @@ def hold_elbow(arm: Record, settings: Record, position: Vector, rotation: Column
     return False
 
 
+@inlined
+def carried_way(arm: Record, place: Vector, dt_s: float) -> Vector:
+    """Way [m] that the trunk alone takes a place of the arm's axes in a frame."""
+    return scale(dt_s, add(vector(arm.carried), cross(vector(arm.carried_spin), place)))
+
+
+@inlined
+def most_way_m(arm: Record, carried: Vector, start: Vector, end: Vector, dt_s: float) -> float:
+    """How far a hand that was held back may go in a frame, in the world: as far as its goal does, or to catch up.
+
+    `start` and `end` of the goal's way are in the arm's axes. Where the trunk alone carries the hand farther, so far.
+    """
+    goals_way = add(subtract(end, start), carried_way(arm, start, dt_s))
+    return max(norm(goals_way), norm(carried), CATCH_UP_M_S * dt_s)
+
+
 @compiled
 def hold_hand(arm: Record, settings: Record, asked: Vector, position: Vector, rotation: Columns, dt_s: float) -> bool:
     """Where the hand would leap to its `position`, it goes part of the way. Returns whether it was free to go.
@@ -58,19 +74,20 @@ def hold_hand(arm: Record, settings: Record, asked: Vector, position: Vector, ro
     if arm.missed_m <= STUCK_M and work.position_error_m <= STUCK_M:
         return True  # a hand that follows does not leap
     before = wrist_at(chain, arm.anchor)
-    way = subtract(wrist_at(chain, q), before)
+    carried = carried_way(arm, before, dt_s)
+    way = add(subtract(wrist_at(chain, q), before), carried)
     way_m = norm(way)
-    allowed_m = max(norm(subtract(asked, vector(arm.asked))), CATCH_UP_M_S * dt_s)
+    allowed_m = most_way_m(arm, carried, vector(arm.asked), asked, dt_s)
     if way_m <= allowed_m:
         return True
     end, restarted = read_configuration(q), arm.restarted
-    nearer = nearest_with_room(chain, add(before, scale(allowed_m / way_m, way)))
+    nearer = nearest_with_room(chain, add(before, subtract(scale(allowed_m / way_m, way), carried)))
     reach = reach_to(chain, nearer)
     swivel = elbow_swivel(reach, columns_of(end[0]))
     work.iterations = reach_with_any_rotation(arm, settings, nearer, rotation, reach, swivel, work.iterations)
     arm.restarted = restarted  # the elbow has leapt all the same
-    if norm(subtract(wrist_at(chain, q), before)) > allowed_m + STUCK_M:  # not with these limits
-        go_part_of_the_way(chain, read_configuration(arm.anchor), end, before, way_m, allowed_m, q)
+    if norm(add(subtract(wrist_at(chain, q), before), carried)) > allowed_m + STUCK_M:  # not with these limits
+        go_part_of_the_way(chain, read_configuration(arm.anchor), end, carried, way_m, allowed_m, q)
         arm.restarted = 0
     here = jacobian_at(chain, read_configuration(q))
     work.position_error_m = norm(subtract(position, here.from_shoulder))
@@ -81,16 +98,18 @@ def hold_hand(arm: Record, settings: Record, asked: Vector, position: Vector, ro
 
 @compiled
 def go_part_of_the_way(
-    chain: Record, start: Configuration, end: Configuration, before: Vector, way_m: float, allowed_m: float, q: Any
+    chain: Record, start: Configuration, end: Configuration, carried: Vector, way_m: float, allowed_m: float, q: Any
 ) -> None:
-    """Move all joints from one configuration towards another, as far as takes the hand `allowed_m` from `before`.
+    """Move all joints from one configuration towards another, as far as takes the hand `allowed_m` in the world.
 
-    All of that motion would take it `way_m`, which is more. The answer goes to `q` (10,).
+    All of that motion would take it `way_m`, which is more; the trunk takes it `carried`. The answer goes to `q` (10,).
     """
+    store_configuration(q, start)
+    before = wrist_at(chain, q)
     motion, share, moved_m = difference(start, end), 1.0, way_m
     for _ in range(PARTS):
         share *= allowed_m / moved_m
         store_configuration(q, integrate(chain, start, tangent.scale(share, motion)))
-        moved_m = norm(subtract(wrist_at(chain, q), before))
+        moved_m = norm(add(subtract(wrist_at(chain, q), before), carried))
         if moved_m <= allowed_m:
             break

@@ -29,6 +29,12 @@ ARM = record_dtype(
         ("escape", np.float64),  # [rad] swivel still to go to where the hand can be met; 0: none
         ("kept", np.float64, (10,)),  # the best so far while another start is tried
         ("asked", np.float64, (3,)),  # of the hand one frame ago [m], in the arm's axes
+        (
+            "carried",
+            np.float64,
+            (3,),
+        ),  # velocity [m/s] with which the trunk carries the shoulder ...
+        ("carried_spin", np.float64, (3,)),  # ... and turns it [rad/s], in the arm's axes
         ("anchor", np.float64, (10,)),  # configuration at the beginning of the frame
         ("calm_started", np.int64),  # 1: there was a frame before (2: and one before that), of which the solve had
         ("calm_wrist", np.float64, (3,)),  # its wrist there [m],
@@ -40,11 +46,8 @@ ARM = record_dtype(
         ("calm_turn", np.float64),  # [rad] about that line, from the solve's elbow to the one shown
         ("calm_speed", np.float64),  # [rad/s] of the one shown
         ("missed_m", np.float64),  # what the solve's hand was off, one frame ago until this one is solved
-        ("goal", np.float64, (10,)),  # of what is shown: the solve's with its elbow calmed
-        ("crosses", np.int64),  # whether what is shown is on its way to a goal that leapt: see ik.crossing
-        ("crossing_rate", np.float64, (9,)),  # [rad/s] of the gap between the two
-        ("crossing_astray_s", np.float64),  # for how long its hand was held up on the way
-        ("crossing_work", WORK),
+        ("calm_astray", np.int64),  # 1 where the hand shown is not where the solve has it
+        ("calm_work", WORK),  # of bringing it there
         # the answer; positions and rotations in the shoulder frame of the arm's own side
         ("configuration", np.float64, (10,)),
         ("shown", np.float64, (10,)),  # the configuration with its elbow calmed, and without leaps
@@ -62,6 +65,7 @@ ARM = record_dtype(
         ("hand_found", np.float64, (4,)),  # the same of the solve, before its elbow is calmed
         ("position_error_m", np.float64),
         ("orientation_error_rad", np.float64),
+        ("relief", np.float64, (3,)),  # [rad] turn of the trunk that would give it room: see ik.relief
         ("elbow_confidence", np.float64),  # 0: any swivel is as comfortable; 1: the comfort is sharp
         ("iterations", np.int64),
         ("limits", np.int64),  # bit i: the arm rests on arm.model.LIMITS[i]
@@ -78,7 +82,7 @@ def initialise_arm(arm: Record, model: ArmModel) -> None:
     arm["chain"] = model.chains[0]
     arm["comfort"] = list(COMFORT.values())
     arm["configuration"] = model.rest
-    arm["shown"] = arm["goal"] = model.rest
+    arm["shown"] = model.rest
 
 
 def new_arm(model: ArmModel) -> npt.NDArray[Any]:

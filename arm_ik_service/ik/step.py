@@ -22,8 +22,8 @@ from arm_ik_service.compiled import Record, compiled, inlined
 from arm_ik_service.geometry.scalar import clip, quaternion, scale, store, vector
 from arm_ik_service.ik.calm import calm
 from arm_ik_service.ik.conjugate import SOLVED
-from arm_ik_service.ik.crossing import THERE, cross_over
 from arm_ik_service.ik.frame_step import first_frame, step_frame
+from arm_ik_service.ik.relief import relief
 from arm_ik_service.ik.state import ARM, initialise_arm
 from arm_ik_service.ik.velocity import ITERATIONS, SPEED_BIT, velocity_from_twist
 
@@ -35,7 +35,7 @@ MIN_DT_S, MAX_DT_S = 1e-3, 0.1  # a frame's time outside this says nothing about
 
 @compiled
 def step_arm(arm: Record, target: Record, dt_s: float, settings: Record) -> None:
-    """Move one arm on to a TARGET (position, rotation, linear_velocity, angular_velocity in the shoulder frame).
+    """Move one arm on to a TARGET (position, rotation and velocities in the shoulder frame).
 
     `dt_s` is the time since the last frame. Never fails: what cannot be met is met as nearly as can be.
     """
@@ -43,15 +43,17 @@ def step_arm(arm: Record, target: Record, dt_s: float, settings: Record) -> None
     dt_s = clip(dt_s, MIN_DT_S, MAX_DT_S)
     position = position_to_arm(chain, vector(target.position))
     rotation = columns_of(hand_to_arm(chain, quaternion(target.rotation)))
+    store(arm.carried, position_to_arm(chain, vector(target.carried_linear_velocity)))
+    store(arm.carried_spin, spin_to_arm(chain, vector(target.carried_angular_velocity)))
     for i in range(10):
         arm.before[i] = arm.shown[i]
     if arm.started == 0:
         first_frame(arm, settings, position, rotation)
     else:
         step_frame(arm, settings, position, rotation, dt_s)
-    calm(arm, settings, rotation, dt_s)
-    cross_over(arm, settings, position, rotation, dt_s)
+    calm(arm, settings, position, rotation, dt_s)
     _keep_sign(arm)
+    store(arm.relief, relief(arm))
     linear = position_to_arm(chain, vector(target.linear_velocity))
     angular = spin_to_arm(chain, vector(target.angular_velocity))
     _move_on(arm, settings, linear, angular, dt_s)
@@ -89,7 +91,7 @@ def _move_on(arm: Record, settings: Record, linear: Any, angular: Any, dt_s: flo
     met = arm.status == SOLVED and limits == arm.limits & ~SPEED_BIT
     follows = met and (limits == 0 or arm.started > MET_FRAMES)
     onward = tangent.STILL
-    if arm.started == 0 or (arm.restarted == 1 and arm.crosses == THERE):  # a jump is no motion
+    if arm.started == 0 or (arm.restarted == 1 and settings.elbow_lag_m == 0.0):  # a jump is no motion
         arm.started = 1
         tangent.store(arm.recent_velocity, tangent.STILL)
     else:

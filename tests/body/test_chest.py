@@ -126,3 +126,10 @@ def test_left_and_right_are_mirror_images() -> None:
     assert np.abs(one["shoulders"] * flip - other["shoulders"][:, ::-1]).max() < 1e-9
     assert np.abs(one["targets"]["position"] * flip - other["targets"]["position"][:, ::-1]).max() < 1e-9
     assert one["reach_ratio"] == pytest.approx(other["reach_ratio"][:, ::-1], abs=1e-9)
+
+
+def test_a_lost_hand_does_not_hold_the_chest_where_the_person_was() -> None:
+    take = standing(3.0)
+    away = np.radians(120.0) * stroke(take.t, 1.0, 1.0, [0.0, 1.0, 0.0])
+    take = take.turned(HEAD, batch.exp(away)).flagged(LEFT, slice(60, None), 0).flagged(RIGHT, slice(60, None), 0)
+    assert yaw_degrees(take)[-1] == pytest.approx(120.0, abs=1.0)

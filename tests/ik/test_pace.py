@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from streams import tumbling
+from streams import run, tumbling
 
 from arm_ik_service.arm.model import ArmModel
+from arm_ik_service.body.state import TARGET
 from arm_ik_service.geometry import batch
 from arm_ik_service.ik.any_rotation import STUCK_M
 from arm_ik_service.ik.jacobian_transpose import JacobianTranspose
@@ -66,3 +67,21 @@ def test_a_track_from_a_start_is_the_same_whatever_was_tracked_before() -> None:
 def test_the_budget_is_kept_on_the_most_hostile_stream() -> None:
     solver = JacobianTranspose(ArmModel.load(side="right"), iterations=20)
     assert solver.track(tumbling(7)).iterations.max() <= 20
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_trunk_that_turns_adds_nothing_to_the_speed_of_a_hand_on_its_way_back(seed: int) -> None:
+    """The hand is measured in the world: of a trunk that spins at 10 rad/s about the shoulder."""
+    arm, spin_rad_s, dt_s = ArmModel.load(side="right"), 10.0, 1.0 / RATE_HZ
+    turns = np.outer(np.arange(FRAMES) * dt_s * spin_rad_s, [0.0, 1.0, 0.0])
+    targets = np.zeros(FRAMES, TARGET)
+    hands = batch.compose(np.concatenate([np.zeros((FRAMES, 3)), batch.exp(-turns)], axis=1), roaming(seed))
+    targets["position"], targets["rotation"] = hands[:, :3], hands[:, 3:]
+    targets["carried_angular_velocity"][:, 1] = spin_rad_s
+    answer = run(arm, targets, dt_s)
+    wrists = batch.rotate(batch.exp(turns), arm.forward(answer.configuration)["wrist"][:, :3])
+    steps = np.linalg.norm(np.diff(wrists, axis=0), axis=1)
+    asked = np.linalg.norm(np.diff(roaming(seed)[:, :3], axis=0), axis=1)
+    carried = spin_rad_s * dt_s * np.linalg.norm(wrists[:-1], axis=1)
+    assert np.mean(answer.position_error_m > STUCK_M) > 0.05, "hands are held back in this stream"
+    assert np.max(steps - np.maximum(np.maximum(asked, carried), CATCH_UP_M_S * dt_s)) < 2.0 * STUCK_M

@@ -10,13 +10,14 @@ from streams import Array, Run, elbow_leaps, random_stream, run, targets_of
 from arm_ik_service.arm.model import ArmModel
 from arm_ik_service.body.report import jerk_rms
 from arm_ik_service.geometry import batch
-from arm_ik_service.ik.crossing import ASTRAY_M, TIME_S
 from arm_ik_service.ik.solver import Status
 from arm_ik_service.settings import SolverSettings
 
 RIGHT = ArmModel.load()
 DT_S = 1.0 / 90.0
 AT_ONCE = msgspec.structs.replace(SolverSettings(), elbow_lag_m=0.0)
+ASTRAY_M = 0.02
+SETTLES_S = 2.4
 SEEDS = (0, 5, 6, 8, 10, 12)
 
 
@@ -44,13 +45,14 @@ def test_a_leap_is_shown_as_a_way(runs: list[tuple[Array, Run, Run]]) -> None:
 
 
 def test_the_elbows_jerk_is_a_fraction_of_the_solves(runs: list[tuple[Array, Run, Run]]) -> None:
-    leapt = 0
+    shares = []
     for _, shown, solved in runs:
         if (elbow_leaps(RIGHT, solved) > 0.0).any():
             t = np.asarray(np.arange(len(shown.elbow)) * DT_S, np.float64)
-            assert jerk_rms(t, shown.elbow) < 0.6 * jerk_rms(t, solved.elbow)
-            leapt += 1
-    assert leapt >= 5
+            shares.append(jerk_rms(t, shown.elbow) / jerk_rms(t, solved.elbow))
+    assert len(shares) >= 5
+    assert max(shares) < 1.0
+    assert np.mean(shares) < 0.5
 
 
 def test_limits_hold_on_the_way(runs: list[tuple[Array, Run, Run]]) -> None:
@@ -80,7 +82,7 @@ def test_it_arrives_when_the_hand_rests(runs: list[tuple[Array, Run, Run]]) -> N
     arrived = 0
     for hands, _, solved in runs:
         for n in np.flatnonzero(elbow_leaps(RIGHT, solved) > 0.0)[:2]:
-            rest = np.tile(hands[n + 2], (int(30 * TIME_S / DT_S), 1))
+            rest = np.tile(hands[n + 2], (int(SETTLES_S / DT_S), 1))
             targets = targets_of(np.vstack([hands[: n + 2], rest]), DT_S)
             shown, goal = run(RIGHT, targets, DT_S), run(RIGHT, targets, DT_S, AT_ONCE)
             if goal.status[-1] == Status.SOLVED:
