@@ -103,6 +103,12 @@ def stroke(t: Array, start_s: float, duration_s: float, way: npt.ArrayLike) -> A
     return np.asarray((10.0 * x**3 - 15.0 * x**4 + 6.0 * x**5) * np.asarray(way))
 
 
+def yaw_degrees(rotations: Array) -> Array:
+    """Return the yaw (N,) of rotations (N, 4) over time, unwrapped; positive to the left."""
+    z = batch.rotate(rotations, [0.0, 0.0, 1.0])
+    return np.degrees(np.unwrap(np.arctan2(z[:, 0], z[:, 2])))
+
+
 @compiled
 def _run(
     tracking: Any, body: Any, frames: Any, receive_ns: Any, tracked: Any, placed: Any, verdicts: Any, ts: Any, bs: Any

@@ -26,6 +26,7 @@ from arm_ik_service.geometry.scalar import (
     normalized,
     rotation_y,
     scale,
+    smoothstep,
 )
 from arm_ik_service.geometry.trigonometry import angle_of
 
@@ -42,8 +43,7 @@ def twist_of(bone: Columns) -> float:
 @compiled
 def _opening(height: float) -> float:
     """How far the twist range has opened: 0 below _OPENS_AT, 1 above _OPEN_AT."""
-    s = clip((height - _OPENS_AT) / (_OPEN_AT - _OPENS_AT), 0.0, 1.0)
-    return s * s * (3.0 - 2.0 * s)
+    return smoothstep((height - _OPENS_AT) / (_OPEN_AT - _OPENS_AT))
 
 
 @compiled
@@ -59,6 +59,13 @@ def twist_excess(chain: Record, twist: float, height: float) -> float:
     """Angle [rad] by which a twist leaves its range: negative below, positive above, 0 inside."""
     lower, upper = twist_range(chain, height)
     return twist - lower if twist < lower else (twist - upper if twist > upper else 0.0)
+
+
+@compiled
+def twist_beyond(chain: Record, twist: float, height: float, margin: float) -> float:
+    """Angle [rad] by which a twist leaves its range drawn in by `margin`, signed as that of `twist_excess`."""
+    lower, upper = twist_range(chain, height)
+    return max(twist + margin - upper, 0.0) + min(twist - margin - lower, 0.0)
 
 
 @inlined

@@ -61,9 +61,9 @@ def _step_forearms(body: Record, yaw: float, elapsed_s: float) -> None:
 @compiled
 def _trust(body: Record, tracking: Record, elapsed_s: float) -> None:
     """Update how far each hand is trusted: one that is lost stays behind where the person was."""
+    share = 1.0 - math.exp(-elapsed_s / TRUST_TIME_S)
     for k in range(2):
         seen = 1.0 if tracking.hands[k].position_age_s == 0.0 else 0.0
-        share = 1.0 - math.exp(-elapsed_s / TRUST_TIME_S)
         body.trust[k] = seen if body.started == 0 else body.trust[k] + share * (seen - body.trust[k])
 
 

@@ -11,6 +11,7 @@ import math
 import numpy as np
 
 from arm_ik_service.body.profile import BodyMeasures, Profile
+from arm_ik_service.body.shoulders import away_from_rest
 from arm_ik_service.compiled import Record, compiled, inlined, record_dtype
 from arm_ik_service.geometry import scalar as g
 
@@ -56,8 +57,6 @@ def initialise_learning(body: Record, profile: Profile) -> None:
     learning["eyes"] = EYES_PER_STATURE * measures.stature_m
     learning["length"] = 1.0
     body["stature"] = measures.stature_m
-    if learning["arms"]:
-        body["arm_length"] = ARM_PER_STATURE * measures.stature_m
 
 
 def resume_learning(body: Record, upper_arm_m: float, forearm_m: float, half_width_m: float) -> None:
@@ -80,6 +79,18 @@ def resume_learning(body: Record, upper_arm_m: float, forearm_m: float, half_wid
         body["half_width"] = half_width_m
 
 
+@inlined
+def _stature(body: Record) -> float:
+    """Estimate of the stature [m] as it is by now: what is learnt, or what the profile says."""
+    return float(body.learning.eyes / EYES_PER_STATURE)
+
+
+@inlined
+def _arm_length(body: Record) -> float:
+    """Estimate of the arm's length [m] as it is by now."""
+    return float(body.learning.length * ARM_PER_STATURE * _stature(body))
+
+
 @compiled
 def _learn_stature(body: Record, eyes_m: float, elapsed_s: float) -> None:
     learning = body.learning
@@ -90,10 +101,7 @@ def _learn_stature(body: Record, eyes_m: float, elapsed_s: float) -> None:
 
 @compiled
 def _learn_length(body: Record, k: int, length_m: float, elapsed_s: float) -> None:
-    side = -1.0 if k == 0 else 1.0
-    lateral = g.rotate(g.quaternion(body.chest_rotation), (side * body.half_width, 0.0, 0.0))
-    shoulder = g.add(g.vector(body.chest_position), lateral)
-    ratio = g.norm(g.subtract(g.vector(body.wrists[k].position), shoulder)) / length_m
+    ratio = g.norm(away_from_rest(body, k)) / length_m
     if ratio > OUT_OF_HAND:
         return
     learning = body.learning
@@ -103,19 +111,15 @@ def _learn_length(body: Record, k: int, length_m: float, elapsed_s: float) -> No
 
 
 @inlined
-def _stature(body: Record) -> float:
-    """Estimate of the stature [m] as it is by now: what is learnt, or what the profile says."""
-    return float(body.learning.eyes / EYES_PER_STATURE)
-
-
-@inlined
 def _grow(body: Record, elapsed_s: float) -> None:
     """Let the body come to its estimates smoothly: those go up or down a step a frame, and arms would tremble by it."""
     learning, share = body.learning, 1.0 - math.exp(-elapsed_s / GROWS_IN_S)
     body.stature += share * (_stature(body) - body.stature)
     if learning.stature and learning.width:
         body.half_width = HALF_WIDTH_PER_STATURE * body.stature
-    body.arm_length += share * (learning.length * ARM_PER_STATURE * _stature(body) - body.arm_length)
+    body.arm_length += share * (_arm_length(body) - body.arm_length)
+    body.upper_arm = UPPER_ARM_PER_ARM * body.arm_length
+    body.forearm = body.arm_length - body.upper_arm
 
 
 @compiled
@@ -127,10 +131,9 @@ def learn(body: Record, tracking: Record, elapsed_s: float) -> None:
     eyes_m = tracking.head.position[1]
     if learning.stature and STANDING_EYES_M[0] < eyes_m < STANDING_EYES_M[1]:
         _learn_stature(body, eyes_m, elapsed_s)
+    length_m = _arm_length(body)  # the same for both hands: left is the mirror of right
     for k in range(2):
         if tracking.hands[k].position_age_s == 0.0:
-            _learn_length(body, k, learning.length * ARM_PER_STATURE * _stature(body), elapsed_s)
+            _learn_length(body, k, length_m, elapsed_s)
     learning.watched_s += elapsed_s
     _grow(body, elapsed_s)
-    body.upper_arm = UPPER_ARM_PER_ARM * body.arm_length
-    body.forearm = body.arm_length - body.upper_arm

@@ -69,15 +69,21 @@ def step_shoulder(body: Record, k: int) -> None:
 
 
 @compiled
+def away_from_rest(body: Record, k: int) -> Vector:
+    """From where the shoulder of one side rests to the wrist asked for [m], in the chest's axes."""
+    side = -body.half_width if k == 0 else body.half_width
+    away = g.subtract(g.vector(body.wrists[k].position), g.vector(body.chest_position))
+    away = g.rotate(g.conjugate(g.quaternion(body.chest_rotation)), away)
+    return g.subtract(away, (side, 0.0, 0.0))
+
+
+@compiled
 def settle(body: Record, k: int, elapsed_s: float) -> None:
     """Let the shoulders sink, for good, where the hand of one side is time and again farther down than the arm is long.
 
     Necks differ by 10 cm between people of one size; a hand that hangs tells where the shoulder above it must be.
     """
-    world_from_chest = g.quaternion(body.chest_rotation)
-    side = -1.0 if k == 0 else 1.0
-    away = g.subtract(g.vector(body.wrists[k].position), g.vector(body.chest_position))
-    away = g.subtract(g.rotate(g.conjugate(world_from_chest), away), (side * body.half_width, 0.0, 0.0))
+    away = away_from_rest(body, k)
     distance = max(g.norm(away), 1e-9)
     excess = min(distance - OVERSTRETCHED * body.arm_length, 0.25 * body.arm_length)
     if excess > 0.0 and away[1] < 0.0:

@@ -115,6 +115,13 @@ def clip(x: float, lower: float, upper: float) -> float:
     return lower if x < lower else (upper if x > upper else x)
 
 
+@inlined
+def smoothstep(x: float) -> float:
+    """From 0 at 0 to 1 at 1 without a kink, and no farther on either side."""
+    x = clip(x, 0.0, 1.0)
+    return x * x * (3.0 - 2.0 * x)
+
+
 @compiled
 def wrap(angle: float) -> float:
     """Return the angle in (-pi, pi] for an angle in (-3 pi, 3 pi)."""

@@ -19,16 +19,13 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from arm_ik_service.arm import tangent
 from arm_ik_service.arm.chain import Columns, columns_of, hand_columns, turn_group, wrist_at
-from arm_ik_service.arm.configuration import difference, integrate, read_configuration, store_configuration
 from arm_ik_service.arm.limits import clamp_shoulder, swing_excess, swing_surely_inside, twist_excess, twist_of
 from arm_ik_service.compiled import Record, compiled, inlined
 from arm_ik_service.geometry.follower import followed_rate
 from arm_ik_service.geometry.scalar import (
     Quaternion,
     Vector,
-    add,
     between,
     clip,
     cross,
@@ -46,7 +43,7 @@ from arm_ik_service.geometry.trigonometry import angle_of, sine_cosine
 from arm_ik_service.ik.any_rotation import POSITION_ALONE, STUCK_M
 from arm_ik_service.ik.conjugate import NEAREST, SOLVED, converge, rotation_error
 from arm_ik_service.ik.jacobian import NO_WRENCH, store_wrench
-from arm_ik_service.ik.pace import carried_way, go_part_of_the_way, most_way_m
+from arm_ik_service.ik.pace import hold_shown_elbow, hold_shown_hand
 from arm_ik_service.ik.swivel import beyond, elbow_side, hand_angles, turn_hand
 
 LONGEST_S = 0.2  # that an elbow takes while the hand rests
@@ -59,7 +56,6 @@ STEP_M = 0.02  # of an elbow in a frame that may be made for the wrist's sake al
 LARGEST_RAD = 3.0  # by which an elbow comes after the solve's: beyond half a turn it comes from the other side
 MOST_MISSED_RAD2 = 0.12**2  # of the hand's rotation, squared, for the elbow's sake
 UNSEEN_RAD = 1e-5  # a turn that is not worth the work
-ELBOW_M_S = 4.0  # speed of an elbow beyond twice its hand's, where limits let it through that held it up until then
 ITERATIONS = 3  # a frame, for a hand whose elbow goes its own way: so few that they do not make it leap after all
 PARTS, HALVINGS = 8, 3  # tries to find how much of a turn the joints allow
 
@@ -101,9 +97,9 @@ def calm(arm: Record, settings: Record, asked: Vector, rotation: Columns, dt_s: 
             speed = (to_go + turn) / dt_s
             arm.calm_speed = speed if abs(speed) < FASTEST_RAD_S else 0.0
         arm.calm_turn = turn
-        held = _hold_elbow(arm, dt_s)
+        held = hold_shown_elbow(arm, dt_s)
         if held or missed == math.inf or arm.calm_astray == 1:
-            _hold_hand(arm, wrist, dt_s)
+            hold_shown_hand(arm, wrist, dt_s)
             off_m = norm(subtract(wrist_at(chain, arm.shown), wrist))
             arm.calm_astray, missed = 1 if off_m > STUCK_M else 0, math.inf
         if missed > 0.0:
@@ -152,17 +148,17 @@ def _turned(
     """
     q = arm.configuration
     hand = turn_group(turn_group(upper_arm, q[4], q[5], q[6])[2], q[7], q[8], 0.0)[2]  # its axial play stays
-    missed = _take(arm, axis, hand, turn, MOST_MISSED_RAD2)
+    missed = _take(arm, axis, hand, turn)
     if missed < MOST_MISSED_RAD2:
         return turn, missed
-    allowed, least, refused = _first_allowed(arm, axis, hand, turn, nearer, MOST_MISSED_RAD2)
+    allowed, least, refused = _first_allowed(arm, axis, hand, turn, nearer)
     if least == math.inf:
         if nearer != 0.0:
             _go_on(arm, settings, axis, hand, nearer)
         return nearer, math.inf
     for _ in range(HALVINGS):
         tried = 0.5 * (allowed + refused)
-        missed = _take(arm, axis, hand, tried, MOST_MISSED_RAD2)
+        missed = _take(arm, axis, hand, tried)
         if missed < MOST_MISSED_RAD2:
             allowed, least = tried, missed
         else:
@@ -171,25 +167,23 @@ def _turned(
 
 
 @compiled
-def _first_allowed(
-    arm: Record, axis: Vector, hand: Columns, start: float, end: float, most_missed: float
-) -> tuple[float, float, float]:
+def _first_allowed(arm: Record, axis: Vector, hand: Columns, start: float, end: float) -> tuple[float, float, float]:
     """Take the first turn from `start` to `end` that is allowed; returns it, what it misses, and the one before it.
 
-    Where none is, what is missed is infinite; at 0 nothing is.
+    Where none is, what is missed is infinite.
     """
     refused = start
     for i in range(PARTS + 1):
         tried = start + (end - start) * (i / PARTS)
-        missed = _take(arm, axis, hand, tried, most_missed)
-        if missed < most_missed:
+        missed = _take(arm, axis, hand, tried)
+        if missed < MOST_MISSED_RAD2:
             return tried, missed, refused
         refused = tried
     return 0.0, math.inf, refused
 
 
 @compiled
-def _take(arm: Record, axis: Vector, hand: Columns, turn: float, most_missed: float) -> float:
+def _take(arm: Record, axis: Vector, hand: Columns, turn: float) -> float:
     """Turn the shown arm about the line, past its hand, unless that misses too much of the hand's rotation [rad^2].
 
     Returns the square of what it misses or would miss; infinity where the shoulder forbids it.
@@ -203,7 +197,7 @@ def _take(arm: Record, axis: Vector, hand: Columns, turn: float, most_missed: fl
     lower, upper = chain.lower, chain.upper
     missed = beyond(pronation, lower[2], upper[2]) + beyond(flexion, lower[3], upper[3])
     missed += beyond(deviation, lower[4], upper[4])
-    if missed < most_missed:
+    if missed < MOST_MISSED_RAD2:
         for i in range(4):
             shown[i] = shoulder[i]
         turn_hand(chain, shown, (pronation, flexion, deviation))
@@ -237,36 +231,6 @@ def _shoulder_turned(configuration: Any, axis: Vector, turn: float) -> Quaternio
     s, c = sine_cosine(0.5 * turn)
     q = (configuration[0], configuration[1], configuration[2], configuration[3])
     return multiply((s * axis[0], s * axis[1], s * axis[2], c), q)
-
-
-@inlined
-def _hold_elbow(arm: Record, dt_s: float) -> bool:
-    """Let the shown elbow go no faster than an elbow does: all joints go part of the way. Returns whether it would."""
-    chain, before, shown = arm.chain, arm.before, arm.shown
-    start = columns_of((before[0], before[1], before[2], before[3]))[1]
-    end = columns_of((shown[0], shown[1], shown[2], shown[3]))[1]
-    way_m, allowed_m = chain.upper_arm_m * norm(subtract(end, start)), ELBOW_M_S * dt_s
-    if way_m <= allowed_m:
-        return False
-    allowed_m += 2.0 * norm(subtract(wrist_at(chain, shown), wrist_at(chain, before)))
-    if way_m <= allowed_m:
-        return False
-    goal = read_configuration(shown)
-    motion = difference(read_configuration(before), goal)
-    store_configuration(shown, integrate(chain, read_configuration(before), tangent.scale(allowed_m / way_m, motion)))
-    return True
-
-
-@inlined
-def _hold_hand(arm: Record, solves: Vector, dt_s: float) -> None:
-    """Let the shown hand go no farther in a frame than it may, on its way back to where the solve has it."""
-    chain, before = arm.chain, wrist_at(arm.chain, arm.before)
-    carried = carried_way(arm, before, dt_s)
-    way_m = norm(add(subtract(wrist_at(chain, arm.shown), before), carried))
-    allowed_m = most_way_m(arm, carried, vector(arm.calm_wrist), solves, dt_s)
-    if way_m > allowed_m:
-        start, end = read_configuration(arm.before), read_configuration(arm.shown)
-        go_part_of_the_way(chain, start, end, carried, way_m, allowed_m, arm.shown)
 
 
 @inlined

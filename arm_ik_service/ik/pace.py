@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from arm_ik_service.arm import tangent
-from arm_ik_service.arm.chain import Columns, columns_of, wrist_at
+from arm_ik_service.arm.chain import Columns, columns_of, position_to_arm, spin_to_arm, wrist_at
 from arm_ik_service.arm.configuration import (
     Configuration,
     difference,
@@ -21,6 +21,7 @@ from arm_ik_service.ik.jacobian import jacobian_at
 from arm_ik_service.ik.swivel import Reach, elbow_swivel, nearest_with_room, reach_to
 
 ELBOW_STEP_M = 0.04  # [m] of the elbow in one frame beyond what the hand moves, whatever the frame rate
+ELBOW_M_S = 4.0  # of the elbow shown beyond twice its hand's speed: limits let through at once what they held up
 CATCH_UP_M_S = 10.0  # speed of a hand on the way back to where it is asked to be, unless it is asked to move faster
 PARTS = 12  # tries to find how much of a motion moves the hand as far as it may: some sweep it far out first
 
@@ -51,7 +52,9 @@ def hold_elbow(arm: Record, settings: Record, position: Vector, rotation: Column
 @inlined
 def carried_way(arm: Record, place: Vector, dt_s: float) -> Vector:
     """Way [m] that the trunk alone takes a place of the arm's axes in a frame."""
-    return scale(dt_s, add(vector(arm.carried), cross(vector(arm.carried_spin), place)))
+    chain = arm.chain
+    spin = spin_to_arm(chain, vector(arm.carried_spin))
+    return scale(dt_s, add(position_to_arm(chain, vector(arm.carried)), cross(spin, place)))
 
 
 @inlined
@@ -113,3 +116,33 @@ def go_part_of_the_way(
         moved_m = norm(add(subtract(wrist_at(chain, q), before), carried))
         if moved_m <= allowed_m:
             break
+
+
+@compiled
+def hold_shown_elbow(arm: Record, dt_s: float) -> bool:
+    """Let the shown elbow go no faster than an elbow does: all joints go part of the way. Returns whether it would."""
+    chain, before, shown = arm.chain, arm.before, arm.shown
+    start = columns_of((before[0], before[1], before[2], before[3]))[1]
+    end = columns_of((shown[0], shown[1], shown[2], shown[3]))[1]
+    way_m, allowed_m = chain.upper_arm_m * norm(subtract(end, start)), ELBOW_M_S * dt_s
+    if way_m <= allowed_m:
+        return False
+    allowed_m += 2.0 * norm(subtract(wrist_at(chain, shown), wrist_at(chain, before)))
+    if way_m <= allowed_m:
+        return False
+    shown_before = read_configuration(before)
+    motion = difference(shown_before, read_configuration(shown))
+    store_configuration(shown, integrate(chain, shown_before, tangent.scale(allowed_m / way_m, motion)))
+    return True
+
+
+@compiled
+def hold_shown_hand(arm: Record, solves: Vector, dt_s: float) -> None:
+    """Let the shown hand go no farther than it may on its way back to `solves`, the place where the solve has it."""
+    chain, before = arm.chain, wrist_at(arm.chain, arm.before)
+    carried = carried_way(arm, before, dt_s)
+    way_m = norm(add(subtract(wrist_at(chain, arm.shown), before), carried))
+    allowed_m = most_way_m(arm, carried, vector(arm.calm_wrist), solves, dt_s)
+    if way_m > allowed_m:
+        start, end = read_configuration(arm.before), read_configuration(arm.shown)
+        go_part_of_the_way(chain, start, end, carried, way_m, allowed_m, arm.shown)

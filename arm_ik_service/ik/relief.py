@@ -8,11 +8,12 @@ that turns with the arm left in space turns the humerus the other way about in t
 from __future__ import annotations
 
 from arm_ik_service.arm.chain import columns_of, spin_from_arm
-from arm_ik_service.arm.limits import swing_excess, swing_gradient, twist_gradient, twist_of, twist_range
+from arm_ik_service.arm.limits import swing_excess, swing_gradient, twist_beyond, twist_gradient, twist_of
 from arm_ik_service.compiled import Record, compiled
-from arm_ik_service.geometry.scalar import Vector, add, scale
+from arm_ik_service.geometry.scalar import Vector, add, combine, scale
+from arm_ik_service.ik.comfort import LIMIT_MARGIN
 
-NEAR_RAD = 0.3  # as where discomfort begins to rise
+NEAR_RAD = LIMIT_MARGIN  # where discomfort begins to rise too
 
 
 @compiled
@@ -21,14 +22,13 @@ def relief(arm: Record) -> Vector:
     chain, c = arm.chain, arm.configuration
     q = (c[0], c[1], c[2], c[3])
     bone = columns_of(q)
-    turn = (0.0, 0.0, 0.0)
-    swing = swing_excess(chain, scale(-1.0, bone[1])) + NEAR_RAD
+    swing = max(swing_excess(chain, scale(-1.0, bone[1])) + NEAR_RAD, 0.0)
+    twist = twist_beyond(chain, twist_of(bone), -bone[1][1], NEAR_RAD)
+    if swing == 0.0 and twist == 0.0:
+        return (0.0, 0.0, 0.0)
+    turn = (0.0, 0.0, 0.0)  # in the humerus' own axes
     if swing > 0.0:
         turn = scale(swing, swing_gradient(chain, bone))
-    twist, (lower, upper) = twist_of(bone), twist_range(chain, -bone[1][1])
-    past = min(twist - (lower + NEAR_RAD), 0.0) + max(twist - (upper - NEAR_RAD), 0.0)
-    if past != 0.0:
-        turn = add(turn, scale(past, twist_gradient(q)))
-    # from the humerus' own axes
-    turn = add(add(scale(turn[0], bone[0]), scale(turn[1], bone[1])), scale(turn[2], bone[2]))
-    return spin_from_arm(chain, turn)
+    if twist != 0.0:
+        turn = add(turn, scale(twist, twist_gradient(q)))
+    return spin_from_arm(chain, combine(turn, bone))

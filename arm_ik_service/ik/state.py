@@ -29,12 +29,8 @@ ARM = record_dtype(
         ("escape", np.float64),  # [rad] swivel still to go to where the hand can be met; 0: none
         ("kept", np.float64, (10,)),  # the best so far while another start is tried
         ("asked", np.float64, (3,)),  # of the hand one frame ago [m], in the arm's axes
-        (
-            "carried",
-            np.float64,
-            (3,),
-        ),  # velocity [m/s] with which the trunk carries the shoulder ...
-        ("carried_spin", np.float64, (3,)),  # ... and turns it [rad/s], in the arm's axes
+        ("carried", np.float64, (3,)),  # velocity [m/s] of the shoulder with the trunk, in shoulder axes ...
+        ("carried_spin", np.float64, (3,)),  # ... and the trunk's own [rad/s]
         ("anchor", np.float64, (10,)),  # configuration at the beginning of the frame
         ("calm_started", np.int64),  # 1: there was a frame before (2: and one before that), of which the solve had
         ("calm_wrist", np.float64, (3,)),  # its wrist there [m],

@@ -43,8 +43,8 @@ def step_arm(arm: Record, target: Record, dt_s: float, settings: Record) -> None
     dt_s = clip(dt_s, MIN_DT_S, MAX_DT_S)
     position = position_to_arm(chain, vector(target.position))
     rotation = columns_of(hand_to_arm(chain, quaternion(target.rotation)))
-    store(arm.carried, position_to_arm(chain, vector(target.carried_linear_velocity)))
-    store(arm.carried_spin, spin_to_arm(chain, vector(target.carried_angular_velocity)))
+    store(arm.carried, vector(target.carried_linear_velocity))
+    store(arm.carried_spin, vector(target.carried_angular_velocity))
     for i in range(10):
         arm.before[i] = arm.shown[i]
     if arm.started == 0:

@@ -15,7 +15,7 @@ import math
 from typing import Any
 
 from arm_ik_service.arm.chain import Columns
-from arm_ik_service.arm.limits import clamp_shoulder, swing_excess, swing_surely_inside, twist_excess, twist_of
+from arm_ik_service.arm.limits import clamp_shoulder, swing_excess, swing_surely_inside, twist_beyond, twist_of
 from arm_ik_service.compiled import Record, compiled, inlined
 from arm_ik_service.geometry.scalar import Vector, add, clip, cross, dot, from_columns, norm, scale, subtract
 from arm_ik_service.geometry.trigonometry import angle_of, sine_cosine
@@ -153,9 +153,7 @@ def violation(chain: Record, posture: Posture, margin: float) -> float:
         swing = max(swing_excess(chain, scale(-1.0, upper_arm[1])) + margin, 0.0)
         total += swing * swing
     twist, height = twist_of(upper_arm), -upper_arm[1][1]
-    ahead = max(twist_excess(chain, twist + margin, height), 0.0) + min(
-        twist_excess(chain, twist - margin, height), 0.0
-    )
+    ahead = twist_beyond(chain, twist, height, margin)
     return total + ahead * ahead
 
 

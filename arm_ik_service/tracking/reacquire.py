@@ -23,5 +23,4 @@ def fading_offset(channel: Record, elapsed_s: float) -> Vector:
     if channel.fading_s >= channel.fades_for_s:
         return (0.0, 0.0, 0.0)
     channel.fading_s += elapsed_s
-    x = min(channel.fading_s / channel.fades_for_s, 1.0)
-    return g.scale(1.0 - x * x * (3.0 - 2.0 * x), g.vector(channel.offset))
+    return g.scale(1.0 - g.smoothstep(channel.fading_s / channel.fades_for_s), g.vector(channel.offset))

@@ -67,7 +67,7 @@ def rounds(frames: list[ControllerFrame], count: int, profile: Profile | None = 
 def test_turned_controllers_are_found_out_until_wrists_follow_them(turn: tuple[float, float, float]) -> None:
     """In two minutes."""
     _, missed = rounds(boxing_with(np.array(turn)), 8)
-    assert missed[0] > 0.04
+    assert missed[0] > 0.05
     assert missed[-1] < 0.03
 
 
@@ -82,7 +82,7 @@ def test_a_mirrored_person_learns_the_mirror_image() -> None:
     plain, _ = rounds(frames, 1)
     mirror, _ = rounds([mirrored_frame(frame) for frame in frames], 1)
     assert np.linalg.norm(plain) > 0.1
-    np.testing.assert_allclose(mirror, plain, atol=2e-3)  # where an arm leaps, the last bits of a number count
+    np.testing.assert_allclose(mirror, plain, atol=1e-4)
 
 
 def test_a_profile_that_says_how_they_sit_is_believed() -> None:
