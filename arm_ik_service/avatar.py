@@ -1,4 +1,4 @@
-"""The one place where the stages are chained: tracking, body, both arms, output; for many avatars or for one.
+"""People solved frame by frame: many avatars in one process, or one.
 
 All state of all avatars lives in one structured array, a row each. Nothing here knows the time, the network or the
 disk: the same frames with the same receive times give the same bytes, live or replayed.
@@ -14,27 +14,20 @@ from typing import Any
 import numpy as np
 
 from arm_ik_service.arm.model import ArmModel
-from arm_ik_service.body.grip import learn_grip
 from arm_ik_service.body.learning import resume_learning
 from arm_ik_service.body.profile import BodyMeasures, Profile
 from arm_ik_service.body.shoulders import STERNOCLAVICULAR
-from arm_ik_service.body.state import BODY
-from arm_ik_service.body.step import initialise_body, step_body
-from arm_ik_service.body.trunk import give_way
 from arm_ik_service.compiled import compiled, record_dtype
 from arm_ik_service.geometry.batch import Array
-from arm_ik_service.ik.state import ARM
-from arm_ik_service.ik.step import initialise_arm, show_ahead, step_arm
 from arm_ik_service.output.message import BODY_BYTES, LITERALS, STEPS, write_body
 from arm_ik_service.output.record import OUTPUT, write_output
-from arm_ik_service.settings import BodySettings, Settings, SolverSettings, TrackingSettings, section_dtype, to_record
+from arm_ik_service.pipeline import PERSON, SETTINGS, arm_models, initialise_person, settings_record, step_person
+from arm_ik_service.settings import Settings
 from arm_ik_service.tracking.frame import FRAME, pack_frame
-from arm_ik_service.tracking.state import TRACKING
-from arm_ik_service.tracking.step import ACCEPTED, initialise_tracking, step_tracking
+from arm_ik_service.tracking.step import ACCEPTED
 from arm_ik_service.wire import codec
-from arm_ik_service.wire.messages import SIDES, VERSION, ArmsHeader, ArmsState, ControllerFrame, Encoding
+from arm_ik_service.wire.messages import VERSION, ArmsHeader, ArmsState, ControllerFrame, Encoding
 
-AVATAR = record_dtype([("tracking", TRACKING), ("body", BODY), ("arms", ARM, (2,))])
 TASK = record_dtype(
     [
         ("row", np.int64),  # of the avatar
@@ -43,13 +36,6 @@ TASK = record_dtype(
         ("frame", FRAME),
         ("verdict", np.int64),
         ("body_bytes", np.int64),  # length of the message's body
-    ]
-)
-SETTINGS = record_dtype(
-    [
-        ("tracking", section_dtype(TrackingSettings)),
-        ("body", section_dtype(BodySettings)),
-        ("solver", section_dtype(SolverSettings)),
     ]
 )
 _TASK_HEAD = struct.Struct("=2qd")
@@ -66,31 +52,20 @@ def step_batch(
     steps: Any,
     count: int,
 ) -> None:
-    """Run every stage for the first `count` tasks in order: task k is of the avatar in its row and fills body k.
+    """Solve and write out the first `count` tasks in order: task k is of the avatar in its row and fills body k.
 
     Records come as memory without a structure, uint8 or int64: to tell numba the type of an array of records takes
     longer than to solve for it.
     """
-    rows, tasks, outputs = rows_memory.view(AVATAR), tasks_memory.view(TASK), outputs_memory.view(OUTPUT)
+    rows, tasks, outputs = rows_memory.view(PERSON), tasks_memory.view(TASK), outputs_memory.view(OUTPUT)
     settings = settings_memory.view(SETTINGS)[0]
     numbers = len(outputs_memory) // len(outputs)
     for k in range(count):
         task = tasks[k]
         row = rows[task.row]
-        task.verdict = step_tracking(row.tracking, task.frame, task.receive_time_ns, settings.tracking)
+        task.verdict = step_person(row, task.frame, task.receive_time_ns, task.ahead_s, settings)
         if task.verdict != ACCEPTED:
             continue
-        step_body(row.body, row.tracking, settings.body)
-        for side in range(2):
-            arm = row.arms[side]
-            if row.body.learning.arms:  # nobody measured this person: their arms are as long as they turn out to be
-                arm.chain.upper_arm_m, arm.chain.forearm_m = row.body.upper_arm, row.body.forearm
-            step_arm(arm, row.body.targets[side], row.tracking.dt_s, settings.solver)
-            if task.ahead_s > 0.0:
-                show_ahead(arm, task.ahead_s)
-        give_way(row.body, row.tracking, row.arms, row.tracking.interval_s)
-        if settings.body.learns:
-            learn_grip(row.body, row.tracking, row.arms, row.tracking.interval_s)
         write_output(outputs[k], row.tracking, row.body, row.arms)
         task.body_bytes = write_body(outputs_memory[k * numbers : (k + 1) * numbers], literals, steps, bodies[k])
 
@@ -100,16 +75,14 @@ class Avatars:
 
     def __init__(self, settings: Settings | None = None, *, capacity: int = 1, batch: int = 1) -> None:
         settings = settings or Settings()
-        self._rows = np.zeros(capacity, AVATAR)
+        self._rows = np.zeros(capacity, PERSON)
         self._memory = self._rows.view(np.uint8)
         tasks = np.zeros(batch, TASK)
         self.verdicts = tasks["verdict"]
         self._body_bytes = tasks["body_bytes"]
         bodies = np.zeros((batch, BODY_BYTES), np.uint8)
         self._bodies = [body.data for body in bodies]
-        of = np.zeros(1, SETTINGS)
-        of["tracking"], of["body"] = to_record(settings.tracking), to_record(settings.body)
-        of["solver"] = to_record(settings.solver)
+        of = settings_record(settings)
         self._tasks = tasks.view(np.uint8)
         self._tasks_buffer = self._tasks.data
         self._rest = (np.zeros(batch, OUTPUT).view(np.int64), bodies, of.view(np.uint8), LITERALS, STEPS)
@@ -121,17 +94,15 @@ class Avatars:
         """Make room for at least `capacity` avatars; those there keep their state."""
         missing = capacity - len(self._rows)
         if missing > 0:
-            self._rows = np.concatenate([self._rows, np.zeros(missing, AVATAR)])
+            self._rows = np.concatenate([self._rows, np.zeros(missing, PERSON)])
             self._memory = self._rows.view(np.uint8)
 
     def reset(self, index: int, profile: Profile) -> None:
         """Make row `index` a person of this profile at rest. Raises ModelError or ProfileError, the row as it was."""
-        models = self._arms(profile)
-        row = self._rows[index]
-        initialise_tracking(row.tracking)
-        initialise_body(row.body, profile)
-        for side, model in enumerate(models):
-            initialise_arm(row.arms[side], model)
+        models = self._models.get(profile)
+        if models is None:
+            models = self._models[profile] = arm_models(profile)
+        initialise_person(self._rows[index], profile, models)
 
     def copy(self, source: int, target: int) -> None:
         """Make row `target` the person in row `source`, as they are now."""
@@ -185,23 +156,6 @@ class Avatars:
         A rotation vector (3,) [rad] in the wrist frame that the profile says; the left hand's is its mirror image.
         """
         return np.array(self._rows[index]["body"]["grip"]["turn"])
-
-    def _arms(self, profile: Profile) -> tuple[ArmModel, ArmModel]:
-        models = self._models.get(profile)
-        if models is None:
-            body = profile.body
-            left, right = (
-                ArmModel.load(
-                    side=side,
-                    upper_arm_m=body.upper_arm,
-                    forearm_m=body.forearm,
-                    hand_m=body.hand,
-                    limits=profile.limits_deg.in_radians(),
-                )
-                for side in SIDES
-            )
-            models = self._models[profile] = (left, right)
-        return models
 
     def add(self, index: int, frame: ControllerFrame, receive_time_ns: int, predict_to_ns: int | None = None) -> int:
         """Put a frame of the avatar in row `index` at the end of the batch; returns its place there.

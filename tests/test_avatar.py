@@ -143,6 +143,11 @@ def test_whoever_is_taken_over_keeps_the_lengths_that_were_learnt_of_them(frames
         avatars.add(0, seen[-1], seen[-1].sample_time_ns)
         avatars.step()
     np.testing.assert_allclose(second.lengths([0]), first.lengths([0]), atol=5e-3)
+    for frame in seen:
+        ns = frame.sample_time_ns + 10_000_000_000
+        second.add(0, msgspec.structs.replace(frame, seq=frame.seq + len(seen), sample_time_ns=ns), ns)
+        second.step()
+    np.testing.assert_allclose(second.lengths([0]), learnt, rtol=0.04)
 
 
 @pytest.mark.parametrize("forearm_m", [float("nan"), 0.0, 7.0])

@@ -1,1 +1,1 @@
-"""One person in space: neck, chest, shoulders, reach, grip to wrist, and the calibration profile."""
+"""One person in space: neck, chest, shoulders, reach, grip to wrist, lengths, and the profile that says them."""

@@ -54,6 +54,7 @@ BODY = record_dtype(
         ("gives", FOLLOWER),  # rotation vector [rad] by which it gives way to the arms, in its own axes: see body.trunk
         ("tilt", FOLLOWER),  # the chest's up over its y, in axes that share its yaw
         ("recentres", np.int64),  # of tracking, that the memory in world axes was moved along with
+        ("lengths", FOLLOWER),  # upper arm, forearm and stature, where they are being learnt
         ("learning", LEARNING),
         ("grip", GRIP),
         ("settled", np.float64),  # how far the shoulders have been found to sit below where they were thought to be

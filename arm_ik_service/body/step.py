@@ -82,13 +82,10 @@ def step_body(body: Record, tracking: Record, settings: Record) -> None:
     for k in range(2):
         _place_wrist(body, tracking, k)
     step_chest(body, tracking, elapsed_s)
-    learns = settings.learns and body.learning.arms
-    if learns:
+    if settings.learns and body.learning.arms:
         learn(body, tracking, elapsed_s)
     for k in range(2):
-        if (
-            not learns and tracking.hands[k].position_age_s == 0.0 and tracking.head.position_age_s == 0.0
-        ):  # both are seen
+        if tracking.hands[k].position_age_s == 0.0 and tracking.head.position_age_s == 0.0:  # both are seen
             settle(body, k, elapsed_s)
         shoulder_before = g.vector(body.shoulders[k])
         step_shoulder(body, k)

@@ -51,7 +51,7 @@ def calibrate(
 
     import msgspec
 
-    from arm_ik_service.body.calibration import calibrate as measure
+    from arm_ik_service.calibration.calibrate import calibrate as measure
     from arm_ik_service.errors import SettingsError
     from arm_ik_service.io.profile_store import find_profile, profile_path, profile_toml, save_profile
     from arm_ik_service.programs.calibrator import describe

@@ -30,8 +30,8 @@ def warm_up(settings: Settings, say: Callable[[str], None]) -> None:
 
         from arm_ik_service.arm.model import ArmModel
         from arm_ik_service.avatar import Avatar
-        from arm_ik_service.body.observation import observe
         from arm_ik_service.body.profile import Profile
+        from arm_ik_service.calibration.observation import observe
         from arm_ik_service.ik.jacobian_transpose import JacobianTranspose
         from arm_ik_service.tracking.frame import FRAME
         from arm_ik_service.wire.messages import VERSION, ControllerFrame, TrackedPose

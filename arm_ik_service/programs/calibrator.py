@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from arm_ik_service.body.calibration import Calibration, Method
+from arm_ik_service.calibration.calibrate import Calibration, Method
 from arm_ik_service.errors import CalibrationError, WireError
 from arm_ik_service.io.zenoh_streams import Bus, subscribe
 from arm_ik_service.tracking.frame import FRAME, pack_frame
@@ -66,5 +66,6 @@ def describe(calibration: Calibration) -> list[str]:
         f"stature {body.stature_m:.2f} m, give or take {100 * calibration.stature_deviation_m:.0f} cm",
         f"upper arm {body.upper_arm:.3f} m, forearm {body.forearm:.3f} m, "
         f"together give or take {100 * calibration.arm_length_deviation_m:.1f} cm",
+        f"shoulders {body.shoulder_width:.2f} m apart",
         *calibration.notes,
     ]

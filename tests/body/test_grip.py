@@ -66,9 +66,9 @@ def rounds(frames: list[ControllerFrame], count: int, profile: Profile | None = 
 @pytest.mark.parametrize("turn", [(0.9, 0.0, 0.0), (-0.9, 0.0, 0.0), (0.0, 0.0, 1.5), (-0.6, 0.0, 0.8)])
 def test_turned_controllers_are_found_out_until_wrists_follow_them(turn: tuple[float, float, float]) -> None:
     """In two minutes."""
-    _, missed = rounds(boxing_with(np.array(turn)), 8)
-    assert missed[0] > 0.05
-    assert missed[-1] < 0.03
+    turns, missed = rounds(boxing_with(np.array(turn)), 8)
+    assert np.linalg.norm(turns[-1]) > 0.1
+    assert missed[-1] < min(0.03, 0.5 * missed[0])
 
 
 def test_controllers_as_assumed_teach_nothing() -> None:
@@ -78,11 +78,11 @@ def test_controllers_as_assumed_teach_nothing() -> None:
 
 
 def test_a_mirrored_person_learns_the_mirror_image() -> None:
-    frames = boxing_with(np.array([0.9, 0.0, 0.0]))
+    frames = boxing_with(np.array([0.9, 0.0, 0.0]))[:250]  # later what was rounded otherwise comes to show in the arms
     plain, _ = rounds(frames, 1)
     mirror, _ = rounds([mirrored_frame(frame) for frame in frames], 1)
-    assert np.linalg.norm(plain) > 0.1
-    np.testing.assert_allclose(mirror, plain, atol=1e-4)
+    assert np.linalg.norm(plain) > 0.05
+    np.testing.assert_allclose(mirror, plain, atol=1e-7)
 
 
 def test_a_profile_that_says_how_they_sit_is_believed() -> None:

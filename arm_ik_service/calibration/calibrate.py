@@ -13,9 +13,7 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from arm_ik_service.body.arm_fit import ARM_LENGTH_PART, ArmFit, fit_arm
-from arm_ik_service.body.observation import Observation, observe
-from arm_ik_service.body.poses import PoseName, StruckPose, find_pose
+from arm_ik_service.body.arm_fit import ARM_LENGTH_PART, AXIS_M
 from arm_ik_service.body.profile import (
     FOREARM_PER_STATURE,
     UPPER_ARM_PER_STATURE,
@@ -23,6 +21,9 @@ from arm_ik_service.body.profile import (
     Grips,
     Profile,
 )
+from arm_ik_service.calibration.arm import Arm, fit_arm
+from arm_ik_service.calibration.observation import Observation, observe
+from arm_ik_service.calibration.poses import PoseName, StruckPose, find_pose
 from arm_ik_service.errors import CalibrationError
 from arm_ik_service.geometry import batch
 
@@ -37,7 +38,7 @@ STATURE_DEVIATION_M = {"t_pose": 0.03, "a_pose": 0.03, "moving": 0.05}  # headse
 POSE_DEVIATION_M = {"t_pose": 0.015, "a_pose": 0.03}  # of an arm length: where the shoulder is enters it
 GRIP_TURNED_RAD = 1.0  # a grip farther off than wrists bend on average is held differently than assumed
 WRIST_BENT_RAD = 0.4  # what of the angle is put down to a wrist that is bent all the time
-AXIS_UNKNOWN_M, AXIS_KNOWN_M, AXIS_FOUND_M = 0.15, 0.03, 0.1  # where the elbow may be beside the hand's axis
+AXIS_UNKNOWN_M, AXIS_FOUND_M = 0.15, 0.1  # AXIS_M for a grip that nobody stated, and for one just found
 
 
 @dataclass(frozen=True)
@@ -82,12 +83,16 @@ def calibrate(frames: np.ndarray[Any, Any], method: Method | None = None, start:
     return _from_movement(frames, start)
 
 
-def _with_measures(start: Profile, stature_m: float, upper_arm_m: float, forearm_m: float) -> Profile:
+def _with_measures(
+    start: Profile, stature_m: float, upper_arm_m: float, forearm_m: float, shoulder_width_m: float | None = None
+) -> Profile:
+    """The profile with these measures; the shoulders' width stays as it is where it was not measured."""
     measures = msgspec.structs.replace(
         start.body,
         stature_m=round(stature_m, 3),
         upper_arm_m=round(upper_arm_m, 4),
         forearm_m=round(forearm_m, 4),
+        shoulder_width_m=start.body.shoulder_width_m if shoulder_width_m is None else round(shoulder_width_m, 3),
     )
     return msgspec.structs.replace(start, body=measures)
 
@@ -146,9 +151,9 @@ def _from_pose(pose: StruckPose, observation: Observation, start: Profile) -> Ca
 # --- movement --------------------------------------------------------------------------------------------------------
 
 
-def _turned_grip(start: Profile, fit: ArmFit) -> tuple[Array, float]:
+def _turned_grip(start: Profile, arm: Arm) -> tuple[Array, float]:
     """Grip in the wrist (4,) that puts the elbow near the hand's axis, by the shortest turn; the angle it was off."""
-    axis = fit.elbow_in_hand / fit.forearm_m
+    axis = arm.elbow_in_hand / arm.forearm_m
     towards = np.array([0.0, 0.0, 1.0])
     turn = np.cross(axis, towards)
     sine = float(np.linalg.norm(turn))
@@ -171,21 +176,21 @@ def _from_movement(frames: np.ndarray[Any, Any], start: Profile) -> Calibration:
     if stature is None:
         notes.append("the head is too low for someone who stands: stature is as it was before")
         stature = start.body.stature_m
-    fit = fit_arm(observation, stature, axis_deviation_m=AXIS_UNKNOWN_M)
-    grip, angle = _turned_grip(start, fit)
+    arm = fit_arm(observation, stature, axis_m=AXIS_UNKNOWN_M)
+    grip, angle = _turned_grip(start, arm)
     changed = angle > GRIP_TURNED_RAD
     if changed:
         profile = _with_grip(start, grip)
         notes.append(f"the controllers are held {np.degrees(angle):.0f} degrees from where OpenXR has the grip")
     for _ in range(ROUNDS):
         observation = observe(frames, profile)
-        fit = fit_arm(observation, stature, axis_deviation_m=AXIS_FOUND_M if changed else AXIS_KNOWN_M)
-        profile = _with_measures(profile, stature, fit.upper_arm_m, fit.forearm_m)
+        arm = fit_arm(observation, stature, axis_m=AXIS_FOUND_M if changed else AXIS_M)
+        profile = _with_measures(profile, stature, arm.upper_arm_m, arm.forearm_m, arm.shoulder_width_m)
     return Calibration(
         profile=profile,
         method="moving",
         stature_deviation_m=STATURE_DEVIATION_M["moving"],
-        arm_length_deviation_m=fit.arm_length_deviation_m,
+        arm_length_deviation_m=arm.length_deviation_m,
         grips_changed=changed,
         seconds=seconds,
         notes=tuple(notes),

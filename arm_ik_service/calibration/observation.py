@@ -10,14 +10,12 @@ import numpy.typing as npt
 
 from arm_ik_service.body.learning import EYES_PER_STATURE, STANDING_EYES_M
 from arm_ik_service.body.profile import Profile
-from arm_ik_service.body.state import BODY
-from arm_ik_service.body.step import initialise_body, step_body
 from arm_ik_service.compiled import compiled, record_dtype
 from arm_ik_service.geometry import batch
 from arm_ik_service.geometry import scalar as g
-from arm_ik_service.settings import BodySettings, TrackingSettings, to_record
-from arm_ik_service.tracking.state import ACCEPTED, TRACKING
-from arm_ik_service.tracking.step import initialise_tracking, step_tracking
+from arm_ik_service.pipeline import PERSON, arm_models, initialise_person, settings_record, step_person
+from arm_ik_service.settings import BodySettings, Settings
+from arm_ik_service.tracking.state import ACCEPTED
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
@@ -79,7 +77,9 @@ def _all_seen(tracking: Any) -> bool:
 def _note(seen: Any, tracking: Any, body: Any) -> None:
     seen.t = 1e-9 * tracking.sample_time_ns
     seen.eye_height_m = tracking.head.position[1]
-    g.store_pose(seen.chest, g.vector(body.chest_position), g.quaternion(body.chest_rotation))
+    chest = g.quaternion(body.chest_rotation)
+    unsettled = g.rotate(chest, (0.0, body.settled, 0.0))  # the shoulders as the measures put them
+    g.store_pose(seen.chest, g.add(g.vector(body.chest_position), unsettled), chest)
     for k in range(2):
         hand, wrist = tracking.hands[k], body.wrists[k]
         seen.hand_speed[k] = g.norm(g.vector(hand.linear_velocity))
@@ -88,29 +88,26 @@ def _note(seen: Any, tracking: Any, body: Any) -> None:
 
 
 @compiled
-def _observe(tracking: Any, body: Any, frames: Any, seen: Any, tracking_settings: Any, body_settings: Any) -> int:
+def _observe(people: Any, frames: Any, seen: Any, settings: Any) -> int:
     """Fill `seen` with the frames in which everything was seen; how many they are."""
-    count = 0
+    person, count = people[0], 0
     for k in range(len(frames)):
         # a recording is in order by itself: no receive time is needed to judge it
-        if step_tracking(tracking, frames[k], frames[k].sample_time_ns, tracking_settings) != ACCEPTED:
+        if step_person(person, frames[k], frames[k].sample_time_ns, 0.0, settings[0]) != ACCEPTED:
             continue
-        body.settled = 0.0  # the shoulders as the measures put them
-        step_body(body, tracking, body_settings)
-        if _all_seen(tracking):
-            _note(seen[count], tracking, body)
+        if _all_seen(person.tracking):
+            _note(seen[count], person.tracking, person.body)
             count += 1
     return count
 
 
 def observe(frames: np.ndarray[Any, Any], profile: Profile) -> Observation:
-    """Track FRAME records (N,) and place the person of `profile` in them."""
-    tracking, body = np.zeros(1, TRACKING), np.zeros(1, BODY)
-    initialise_tracking(tracking[0])
-    initialise_body(body[0], profile)
-    settings = to_record(TrackingSettings()), to_record(BodySettings(learns=False))
+    """Track FRAME records (N,) and place the person of `profile` in them, arms and all: trunks give way to them."""
+    people = np.zeros(1, PERSON)
+    initialise_person(people[0], profile, arm_models(profile))
+    settings = settings_record(Settings(body=BodySettings(learns=False)))
     seen = np.zeros(len(frames), _SEEN)
-    seen = seen[: _observe(tracking[0], body[0], frames, seen, *settings)]
+    seen = seen[: _observe(people, frames, seen, settings)]
     chest_from_world = batch.inverse(seen["chest"])[:, None]
     return Observation(
         t=seen["t"],

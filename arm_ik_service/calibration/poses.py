@@ -8,8 +8,8 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from arm_ik_service.body.observation import Observation
 from arm_ik_service.body.profile import FOREARM_PER_STATURE, SHOULDER_WIDTH_PER_STATURE, UPPER_ARM_PER_STATURE
+from arm_ik_service.calibration.observation import Observation
 from arm_ik_service.errors import CalibrationError
 
 Array = npt.NDArray[np.float64]

@@ -3,84 +3,19 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 import pytest
-from persons import HEAD, LEFT, RIGHT, Take, run, standing
+from movers import DEFAULT_GRIP, GRIP, PEOPLE, lively
+from persons import LEFT, RIGHT, Take, standing
 
-from arm_ik_service.body.calibration import Calibration, calibrate
-from arm_ik_service.body.profile import BodyMeasures, Grips, Profile
+from arm_ik_service.body.profile import BodyMeasures
+from arm_ik_service.calibration.calibrate import Calibration, calibrate
 from arm_ik_service.errors import CalibrationError
 from arm_ik_service.geometry import batch
-
-Array = npt.NDArray[np.float64]
-GRIP = Grips().right
-DEFAULT_GRIP = np.array([*GRIP.position_m, *GRIP.orientation_xyzw])
-
-
-def sway(rng: np.random.Generator, t: Array, lower: npt.ArrayLike, upper: npt.ArrayLike) -> Array:
-    """Smooth random angles (N, k) [rad] between bounds [degrees]."""
-    lower, upper = np.radians(lower), np.radians(upper)
-    phase = rng.uniform(0.0, 2.0 * np.pi, (3, len(lower)))
-    speed = rng.uniform(0.5, 4.0, (3, len(lower)))
-    wave = np.sin(speed[:, None] * t[None, :, None] + phase[:, None]).sum(axis=0)
-    return np.asarray(0.5 * (lower + upper) + 0.5 * (upper - lower) * np.tanh(wave))
-
-
-def turns(x: Array, y: Array, z: Array) -> Array:
-    """Rotations (N, 4): about x, then about z, then about y."""
-    zero = np.zeros_like(x)
-    about = [np.stack(v, axis=-1) for v in ((x, zero, zero), (zero, zero, z), (zero, y, zero))]
-    return batch.multiply(batch.exp(about[2]), batch.multiply(batch.exp(about[1]), batch.exp(about[0])))
-
-
-def arm(
-    rng: np.random.Generator,
-    t: Array,
-    upper_arm: float,
-    forearm: float,
-    shoulder: npt.ArrayLike,
-    grip: Array,
-    flick: float = 1.0,
-) -> Array:
-    """Grip poses (N, 7) of a right arm that moves about its shoulder; its wrist bends by 25 degrees times `flick`."""
-    abduction, flexion, bend, roll = sway(rng, t, [5, -30, 0, -60], [80, 120, 110, 60]).T
-    chest_from_upper = turns(flexion, -0.3 * abduction, abduction)
-    elbow = np.asarray(shoulder) + batch.rotate(chest_from_upper, [0.0, -upper_arm, 0.0])
-    chest_from_fore = batch.multiply(chest_from_upper, turns(bend, 0.0 * bend, 0.0 * bend))
-    down = batch.rotate(chest_from_fore, [0.0, -1.0, 0.0])
-    # the wrist frame of a straight wrist has its -z along the forearm; then it bends
-    hand = batch.multiply(chest_from_fore, batch.exp([-0.5 * np.pi, 0.0, 0.0]))
-    hand = batch.multiply(hand, batch.exp(np.stack([0 * roll, 0 * roll, roll], axis=1)))
-    bent = flick * sway(rng, t, [-25, -15, -1], [25, 15, 1])
-    wrist = np.concatenate([elbow + forearm * down, batch.multiply(hand, batch.exp(bent))], axis=1)
-    return batch.compose(wrist, grip)
-
-
-def lively(seconds: float, body: BodyMeasures, grip: Array = DEFAULT_GRIP, seed: int = 0, flick: float = 1.0) -> Take:
-    """Return someone of these measures who stands and moves both arms about; left grips are mirrored."""
-    rng = np.random.default_rng(seed)
-    take = standing(seconds, 60.0)
-    length = body.upper_arm + body.forearm
-    eyes = 0.936 * body.stature_m
-    half = 0.5 * body.shoulder_width
-    shoulder = np.array([half, eyes - 0.165 * length / 0.56 - 0.26 * half, 0.13 * length / 0.56])
-    take.poses[:, HEAD, 1] = eyes
-    take.poses[:, RIGHT] = arm(rng, take.t, body.upper_arm, body.forearm, shoulder, grip, flick)
-    take.poses[:, LEFT] = batch.mirror_pose(arm(rng, take.t, body.upper_arm, body.forearm, shoulder, grip, flick))
-    return take
 
 
 def length_error(found: Calibration, body: BodyMeasures) -> float:
     length = body.upper_arm + body.forearm
     return (found.profile.body.upper_arm + found.profile.body.forearm) / length - 1.0
-
-
-PEOPLE = [
-    BodyMeasures(stature_m=1.6),
-    BodyMeasures(stature_m=1.9),
-    BodyMeasures(stature_m=1.75, upper_arm_m=0.35, forearm_m=0.27),
-    BodyMeasures(stature_m=1.75, upper_arm_m=0.3, forearm_m=0.23),
-]
 
 
 @pytest.mark.parametrize("body", PEOPLE)
@@ -193,41 +128,3 @@ def test_someone_who_is_not_there_or_does_not_move_is_refused() -> None:
         calibrate(standing(2.0).flagged(LEFT, slice(None), 0).frames)
     with pytest.raises(CalibrationError, match="hardly moved"):
         calibrate(standing(5.0).frames, "moving")
-
-
-def test_who_never_calibrates_is_measured_while_they_move() -> None:
-    for stature in (1.6, 1.9):
-        body = BodyMeasures(stature_m=stature)
-        learnt = run(lively(60.0, body).frames).body
-        settled = learnt[len(learnt) // 2 :]
-        assert settled["stature"] == pytest.approx(stature, abs=0.03)
-        assert settled["arm_length"] == pytest.approx(body.upper_arm + body.forearm, rel=0.06)
-        assert (settled["reach_ratio"] > 1.02).mean() < 0.01
-
-
-def test_longer_arms_than_stature_says_are_learnt_from_reach() -> None:
-    body = BodyMeasures(stature_m=1.75, upper_arm_m=0.38, forearm_m=0.29)
-    learnt = run(lively(60.0, body).frames).body
-    assert learnt["arm_length"][0] < 0.59
-    assert learnt["arm_length"][-1] > 0.63
-    assert np.abs(np.diff(learnt["arm_length"])).max() < 0.01
-
-
-@pytest.mark.parametrize("name", ["arm_length", "half_width"])
-def test_nobody_trembles_while_they_are_measured(name: str) -> None:
-    lengths = run(lively(10.0, PEOPLE[1]).frames).body[name]
-    assert np.ptp(lengths) > 0.005
-    assert np.abs(np.diff(lengths, 2)).max() < 3e-4
-
-
-def test_measures_that_are_stated_are_never_touched() -> None:
-    body = BodyMeasures(stature_m=1.7, upper_arm_m=0.29, forearm_m=0.25, shoulder_width_m=0.35)
-    made = run(lively(20.0, PEOPLE[1]).frames, profile=Profile(body=body)).body
-    assert (made["arm_length"] == body.upper_arm + body.forearm).all()
-    assert (made["half_width"] == 0.175).all()
-    assert (made["stature"] == 1.7).all()
-
-
-def test_someone_seated_keeps_the_stature_they_had() -> None:
-    take = standing(20.0).in_space([0.0, -0.5, 0.0, 0.0, 0.0, 0.0, 1.0])
-    assert run(take.frames).body["stature"][-1] == 1.75
