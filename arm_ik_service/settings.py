@@ -63,7 +63,7 @@ class ServiceSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     key_prefix: str = ""  # put before every key, for several installations on one network
     encoding: Encoding = "msgpack"  # of what goes out; what comes in may be either
-    max_avatars: Annotated[int, Meta(ge=1, le=100_000)] = 256  # rows are allocated at the start, about 6 KiB each
+    max_avatars: Annotated[int, Meta(ge=1, le=100_000)] = 256  # rows are allocated at the start, about 12 KiB each
     max_message_bytes: Annotated[int, Meta(ge=512)] = 4096  # the largest honest frame is about 1 KiB, in JSON
     # of one avatar: the fastest trackers give 1000 poses a second; what comes beyond is dropped before it is decoded
     max_frames_per_s: Annotated[float, Meta(ge=1.0)] = 1000.0

@@ -146,11 +146,13 @@ def run(
     profile: Profile | None = None,
     tracking: TrackingSettings | None = None,
     body: BodySettings | None = None,
+    settled_m: float = 0.0,
 ) -> Run:
     """Send FRAME records (N,) through both stages; received when they were sampled unless said otherwise."""
     t, b = np.zeros(1, TRACKING), np.zeros(1, BODY)
     initialise_tracking(t[0])
     initialise_body(b[0], profile or Profile())
+    b[0].settled = settled_m
     n = len(frames)
     out = Run(np.zeros(n, TRACKING), np.zeros(n, BODY), np.zeros(n, np.int64))
     times = frames["sample_time_ns"] if receive_ns is None else receive_ns

@@ -8,6 +8,7 @@ import pytest
 from harness import standing
 
 from arm_ik_service import Avatar, Avatars, Profile, Settings
+from arm_ik_service.body.profile import BodyMeasures
 from arm_ik_service.io.session import open_session
 from arm_ik_service.programs.demo import bundled_session
 from arm_ik_service.wire.messages import ControllerFrame, TrackedPose
@@ -145,23 +146,53 @@ def test_whoever_is_taken_over_keeps_the_lengths_that_were_learnt_of_them(frames
     np.testing.assert_allclose(second.lengths([0]), first.lengths([0]), atol=5e-3)
     for frame in seen:
         ns = frame.sample_time_ns + 10_000_000_000
-        second.add(0, msgspec.structs.replace(frame, seq=frame.seq + len(seen), sample_time_ns=ns), ns)
-        second.step()
-    np.testing.assert_allclose(second.lengths([0]), learnt, rtol=0.04)
+        for avatars in (first, second):
+            avatars.add(0, msgspec.structs.replace(frame, seq=frame.seq + len(seen), sample_time_ns=ns), ns)
+            avatars.step()
+    np.testing.assert_allclose(second.lengths([0]), first.lengths([0]), rtol=0.08)
 
 
-@pytest.mark.parametrize("forearm_m", [float("nan"), 0.0, 7.0])
-def test_lengths_that_no_person_has_are_not_taken_over(frames: list[ControllerFrame], forearm_m: float) -> None:
+@pytest.mark.parametrize("stature_m", [1.75, 1.8], ids=["open", "stated"])
+@pytest.mark.parametrize("bone", ["clavicle", "forearm", "hand"])
+@pytest.mark.parametrize("x_m", [float("nan"), 0.0, 7.0])
+def test_lengths_that_no_person_has_are_not_taken_over(
+    frames: list[ControllerFrame], x_m: float, bone: str, stature_m: float
+) -> None:
     first, second = Avatars(), Avatars()
     for avatars in (first, second):
-        avatars.reset(0, Profile())
+        avatars.reset(0, Profile(body=BodyMeasures(stature_m=stature_m)))
     first.add(0, frames[0], frames[0].sample_time_ns)
     first.step()
     last = first.answer(0, frames[0], "one", 0)
     bones = last.right.bones
-    x, y, z = bones.forearm.position
-    away = msgspec.structs.replace(bones.hand, position=(x + forearm_m, y, z))
-    arm = msgspec.structs.replace(last.right, bones=msgspec.structs.replace(bones, hand=away))
+    before_it = {"clavicle": last.left.bones.clavicle, "forearm": bones.upper_arm, "hand": bones.forearm}[bone]
+    x, y, z = before_it.position
+    away = msgspec.structs.replace(getattr(bones, bone), position=(x + x_m, y, z))
+    arm = msgspec.structs.replace(last.right, bones=msgspec.structs.replace(bones, **{bone: away}))
     before = second.lengths([0])
     assert second.resume(0, msgspec.structs.replace(last, right=arm))
     np.testing.assert_array_equal(second.lengths([0]), before)
+
+
+@pytest.mark.parametrize(
+    "stated", [BodyMeasures(stature_m=1.38), BodyMeasures(stature_m=1.9), BodyMeasures(shoulder_width_m=0.4)]
+)
+def test_what_a_profile_states_stays_when_the_rest_is_taken_over(
+    frames: list[ControllerFrame], stated: BodyMeasures
+) -> None:
+    first, second = Avatars(), Avatars()
+    for avatars in (first, second):
+        avatars.reset(0, Profile(body=stated))
+    for frame in frames:
+        place = first.add(0, frame, frame.sample_time_ns)
+        first.step()
+    assert second.resume(0, first.answer(place, frame, "one", 0))
+    width_or_stature = 3 if stated.shoulder_width_m else 0
+    assert second.lengths([0])[0, width_or_stature] == first.lengths([0])[0, width_or_stature]
+    np.testing.assert_allclose(second.lengths([0])[:, 1:3], first.lengths([0])[:, 1:3], atol=1e-9)
+    for frame in frames:
+        ns = frame.sample_time_ns + 10_000_000_000
+        for avatars in (first, second):
+            avatars.add(0, msgspec.structs.replace(frame, seq=frame.seq + len(frames), sample_time_ns=ns), ns)
+            avatars.step()
+    np.testing.assert_allclose(second.lengths([0])[:, 1:3], first.lengths([0])[:, 1:3], rtol=0.08)

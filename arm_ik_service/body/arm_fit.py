@@ -32,8 +32,8 @@ from arm_ik_service.geometry.scalar import Quaternion, Vector
 # where, the CMU and Xia recordings say.
 ARM_PER_STATURE = 0.324
 SEGMENTS = 1.2
-FOREARM_PER_STATURE = ARM_PER_STATURE / (1.0 + SEGMENTS)
-UPPER_ARM_PER_STATURE = ARM_PER_STATURE - FOREARM_PER_STATURE
+EXPECTED_FOREARM_PER_STATURE = ARM_PER_STATURE / (1.0 + SEGMENTS)
+EXPECTED_UPPER_ARM_PER_STATURE = ARM_PER_STATURE - EXPECTED_FOREARM_PER_STATURE
 
 # standard deviations, chosen so that the mocap recordings are as far off as they say
 SHOULDER_M: Vector = (0.015, 0.03, 0.05)  # to the side, up, back: trunks turn and lean into a reach
@@ -51,7 +51,7 @@ STRETCHED, STRETCHED_PART, STRETCHES_AFTER_S = 0.95, 0.045, 10.0
 
 MEMORY_S = 300.0  # of movement: what is older fades
 LARGEST_STEP_M = 0.1  # of an unknown, in a step of Gauss-Newton
-BONES_RANGE = (0.6, 1.6)  # over what was expected: whatever is seen, bones are those of a person
+BONES_RANGE = (0.7, 1.4)  # over what was expected: whatever is seen, these are the lengths of a person
 
 # unknowns: shoulder in the chest's frame, elbow in the hand's, upper arm [m]; of the right arm, the left is its mirror
 SHOULDER, ELBOW, UPPER_ARM, UNKNOWNS = 0, 3, 6, 7
@@ -135,7 +135,7 @@ def show(fit: Record, k: int, hand: Vector, rotation: Quaternion) -> None:
 def take(fit: Record, left_s: float, right_s: float) -> None:
     """Take the samples of both hands in, each for so many seconds of movement; for 0 s, one that was not shown."""
     seconds = left_s + right_s
-    if seconds <= 0.0:
+    if seconds < 1e-6:
         return
     fit.seconds += 0.5 * seconds
     share = 0.5 / min(fit.seconds, MEMORY_S)
@@ -257,7 +257,7 @@ def linearise(fit: Record) -> None:
         fit.gradient[a] = 0.0
         for b in range(UNKNOWNS):
             fit.normal[a, b] = 0.0
-    forearm = max(g.norm(elbow(fit)), 1e-3)
+    forearm = g.norm(elbow(fit))
     along_forearm = g.scale(1.0 / forearm, elbow(fit))
     length = fit.x[UPPER_ARM] + forearm
     _add_equations(fit)
@@ -281,7 +281,7 @@ def _solve(a: Any, b: Any) -> None:
 
 
 @inlined
-def _as_bone(length_m: float, expected_m: float) -> float:
+def _as_persons(length_m: float, expected_m: float) -> float:
     return g.clip(length_m, BONES_RANGE[0] * expected_m, BONES_RANGE[1] * expected_m)
 
 
@@ -293,9 +293,12 @@ def improve(fit: Record) -> None:
     before = shoulder(fit)
     for a in range(UNKNOWNS):
         fit.x[a] -= g.clip(fit.gradient[a], -LARGEST_STEP_M, LARGEST_STEP_M)
-    fit.x[UPPER_ARM] = _as_bone(fit.x[UPPER_ARM], fit.upper_arm)
-    forearm = max(g.norm(elbow(fit)), 1e-3)
-    longer = _as_bone(forearm, fit.forearm) / forearm
+    fit.x[SHOULDER] = _as_persons(fit.x[SHOULDER], fit.half_width)
+    fit.x[UPPER_ARM] = _as_persons(fit.x[UPPER_ARM], fit.upper_arm)
+    forearm = g.norm(elbow(fit))
+    if forearm < 1e-3:  # no direction to speak of
+        fit.x[ELBOW + 2], forearm = fit.forearm, fit.forearm
+    longer = _as_persons(forearm, fit.forearm) / forearm
     for i in range(3):
         fit.x[ELBOW + i] *= longer
     fit.reach -= g.dot(g.vector(fit.towards), g.subtract(shoulder(fit), before))

@@ -14,11 +14,11 @@ import numpy as np
 from arm_ik_service.body.arm_fit import (
     ARM_FIT,
     ARM_LENGTH_PART,
-    ARM_PER_STATURE,
     AXIS_M,
-    FOREARM_PER_STATURE,
+    BONES_RANGE,
+    EXPECTED_FOREARM_PER_STATURE,
+    EXPECTED_UPPER_ARM_PER_STATURE,
     UPPER_ARM,
-    UPPER_ARM_PER_STATURE,
     begin,
     elbow,
     expect,
@@ -42,16 +42,15 @@ EYES_SETTLE_AFTER_S = 5.0  # ... and the time after which it is half of that
 STANDING_EYES_M = (1.3, 2.1)  # lower: seated, or a space without a floor, which says nothing of stature
 
 SAMPLES_S = 0.03  # between two samples of the arms
-MOVES_M_S = 0.3  # what a slower hand shows counts for less: it is the same for long
-FARTHEST_TIME = 0.01  # share of the time that a hand may be farther away than the farthest reach
+MOVES_M_S = 0.1  # what a slower hand shows counts for less time, by the square: at rest it is the same for long
+FARTHEST_TIME = 0.01  # share of the time in which they move that hands may be farther away than the farthest reach
 REACH_M_S = 1.0  # speed of that estimate at first ...
 REACH_SETTLES_AFTER_S = 5.0  # ... and the movement after which it is half of that
 TOWARDS_TIME_S = 0.3  # in which the farthest hands say where they are
-OUT_OF_HAND = 1.45  # a hand so many arm lengths away has let go of the controller
+OUT_OF_HAND = 1.45  # a hand so many expected arm lengths away has let go of the controller
 GROWS_IN_S = 0.4  # by which the body trails the estimates
 WATCHED_BEFORE_S = 30.0  # by the process that another takes a person over from
-TAKEN_OVER_PART = 0.03  # standard deviation of an arm's length that another process learnt, over that length
-LENGTH_RANGE = (0.8, 1.3)  # of what stature says: others are not taken over
+TAKEN_OVER_PART = 0.04  # standard deviation of an arm's length that it learnt, over that length
 
 LEARNING = record_dtype(
     [
@@ -61,21 +60,20 @@ LEARNING = record_dtype(
         ("watched_s", np.float64),
         ("since_sample_s", np.float64),
         ("eyes", np.float64),  # estimate of their height [m]
-        ("upper_arm", np.float64),  # expected, over stature
-        ("forearm", np.float64),
+        ("by_stature", np.int64),  # 1 where stature says what arms to expect, 0 where they were taken over
         ("fit", ARM_FIT),
     ]
 )
 
 
 def initialise_learning(body: Record, profile: Profile) -> None:
-    """Learn what the profile leaves open; a stature that is the default one counts as not stated."""
+    """Learn what the profile leaves open, unless it states a bone of the arm; the default stature is none stated."""
     measures, learning = profile.body, body["learning"]
     learning["arms"] = measures.upper_arm_m is None and measures.forearm_m is None
     learning["width"] = measures.shoulder_width_m is None
     learning["stature"] = learning["arms"] and measures.stature_m == BodyMeasures().stature_m
     learning["eyes"] = EYES_PER_STATURE * measures.stature_m
-    learning["upper_arm"], learning["forearm"] = UPPER_ARM_PER_STATURE, FOREARM_PER_STATURE
+    learning["by_stature"] = 1
     learning["fit"]["length_part"], learning["fit"]["axis_m"] = ARM_LENGTH_PART, AXIS_M
     body["stature"] = measures.stature_m
     _expect(body)
@@ -89,22 +87,26 @@ def resume_learning(body: Record, upper_arm_m: float, forearm_m: float, half_wid
     Lengths that no person has are not taken.
     """
     learning = body["learning"]
-    length_m = upper_arm_m + forearm_m
-    if not learning["arms"] or not min(upper_arm_m, forearm_m) > 0.0:
+    if not learning["arms"]:
         return
     stature = half_width_m / HALF_WIDTH_PER_STATURE if learning["width"] and learning["stature"] else body["stature"]
-    eyes, length = EYES_PER_STATURE * stature, length_m / (ARM_PER_STATURE * stature)
-    if not (STANDING_EYES_M[0] <= eyes <= STANDING_EYES_M[1] and LENGTH_RANGE[0] <= length <= LENGTH_RANGE[1]):
+    expected = (EXPECTED_UPPER_ARM_PER_STATURE, EXPECTED_FOREARM_PER_STATURE, HALF_WIDTH_PER_STATURE)
+    taken = (upper_arm_m, forearm_m, half_width_m if learning["width"] else HALF_WIDTH_PER_STATURE * stature)
+    lower, upper = BONES_RANGE
+    if not all(lower * e * stature <= t <= upper * e * stature for t, e in zip(taken, expected, strict=True)):
         return
-    learning["watched_s"] = WATCHED_BEFORE_S
-    learning["eyes"] = eyes
-    learning["upper_arm"], learning["forearm"] = upper_arm_m / stature, forearm_m / stature
+    if learning["stature"] and not STANDING_EYES_M[0] <= EYES_PER_STATURE * stature <= STANDING_EYES_M[1]:
+        return
+    learning["watched_s"] = WATCHED_BEFORE_S if learning["width"] else 0.0
+    learning["eyes"] = EYES_PER_STATURE * stature
+    learning["by_stature"] = 0
     learning["fit"]["length_part"] = TAKEN_OVER_PART
-    body["stature"], body["arm_length"], body["upper_arm"], body["forearm"] = stature, length_m, upper_arm_m, forearm_m
     if learning["width"]:
         body["half_width"] = half_width_m
-    _expect(body)
+    expect(learning["fit"], upper_arm_m, forearm_m, body["half_width"])
     begin(learning["fit"])
+    body["stature"] = stature
+    body["upper_arm"], body["forearm"], body["arm_length"] = upper_arm_m, forearm_m, upper_arm_m + forearm_m
     body["lengths"]["at"] = (upper_arm_m, forearm_m, stature)
 
 
@@ -118,8 +120,11 @@ def _stature(body: Record) -> float:
 def _expect(body: Record) -> None:
     """Let the arm's fit expect what the stature says."""
     learning, stature = body.learning, _stature(body)
+    upper_arm, forearm = learning.fit.upper_arm, learning.fit.forearm
+    if learning.by_stature:
+        upper_arm, forearm = EXPECTED_UPPER_ARM_PER_STATURE * stature, EXPECTED_FOREARM_PER_STATURE * stature
     half_width = HALF_WIDTH_PER_STATURE * stature if learning.width else body.half_width
-    expect(learning.fit, learning.upper_arm * stature, learning.forearm * stature, half_width)
+    expect(learning.fit, upper_arm, forearm, half_width)
 
 
 @compiled
@@ -148,8 +153,7 @@ def _learn_arms(body: Record, tracking: Record, elapsed_s: float) -> None:
     fit = learning.fit
     learning.since_sample_s += elapsed_s
     sampled = learning.since_sample_s >= SAMPLES_S
-    seen, far, towards = 0, 0, (0.0, 0.0, 0.0)
-    moved_s = (0.0, 0.0)
+    seen_s, far_s, towards, sampled_s = 0.0, 0.0, (0.0, 0.0, 0.0), (0.0, 0.0)
     for k in range(2):
         device = tracking.hands[k]
         if device.position_age_s > 0.0 or device.rotation_age_s > 0.0:
@@ -157,25 +161,26 @@ def _learn_arms(body: Record, tracking: Record, elapsed_s: float) -> None:
         hand, rotation = _in_chest(body, k)
         away = g.subtract(hand, shoulder(fit))
         distance = g.norm(away)
-        if distance > OUT_OF_HAND * body.arm_length:
+        if distance > OUT_OF_HAND * (fit.upper_arm + fit.forearm):
             continue
-        seen += 1
+        velocity = g.vector(device.linear_velocity)
+        moves = min(1.0, g.dot(velocity, velocity) / (MOVES_M_S * MOVES_M_S))
+        seen_s += moves * elapsed_s
         if distance > fit.reach:
-            far += 1
-            towards = g.add(towards, g.scale(1.0 / distance, away))
-        if not sampled:
-            continue
-        show(fit, k, hand, rotation)
-        seconds = learning.since_sample_s * min(1.0, g.norm(g.vector(device.linear_velocity)) / MOVES_M_S)
-        moved_s = (moved_s[0], seconds) if k == 1 else (seconds, moved_s[1])
-    pace = REACH_M_S * elapsed_s / (1.0 + fit.seconds / REACH_SETTLES_AFTER_S)
-    fit.reach += pace * (far - FARTHEST_TIME * seen)
-    share = 1.0 - math.exp(-elapsed_s / TOWARDS_TIME_S)
+            far_s += moves * elapsed_s
+            towards = g.add(towards, g.scale(moves * elapsed_s / distance, away))
+        if sampled:
+            show(fit, k, hand, rotation)
+            moved_s = moves * learning.since_sample_s
+            sampled_s = (sampled_s[0], moved_s) if k == 1 else (moved_s, sampled_s[1])
+    pace = REACH_M_S / (1.0 + fit.seconds / REACH_SETTLES_AFTER_S)
+    fit.reach += pace * (far_s - FARTHEST_TIME * seen_s)
     before = g.vector(fit.towards)
-    g.store(fit.towards, g.add(before, g.scale(share, g.subtract(towards, g.scale(far, before)))))
+    turn = g.subtract(towards, g.scale(far_s, before))
+    g.store(fit.towards, g.add(before, g.scale(1.0 / (TOWARDS_TIME_S + far_s), turn)))
     if sampled:
         learning.since_sample_s = 0.0
-        take(fit, moved_s[0], moved_s[1])
+        take(fit, sampled_s[0], sampled_s[1])
         _expect(body)
         improve(fit)
 
@@ -194,7 +199,7 @@ def _grow(body: Record, elapsed_s: float) -> None:
 @compiled
 def learn(body: Record, tracking: Record, elapsed_s: float) -> None:
     """Take one frame into the estimates, and the estimates into the body. Call where `body.learning.arms` is set."""
-    if tracking.head.position_age_s > 0.0:
+    if tracking.head.position_age_s > 0.0 or tracking.head.rotation_age_s > 0.0:
         return
     learning = body.learning
     eyes_m = tracking.head.position[1]

@@ -1,4 +1,4 @@
-"""The arm of someone who moved about: fitted as those of people without a profile are, with all frames at hand."""
+"""The arm of someone who moved about: the fit of people without a profile, its farthest reach from all the frames."""
 
 from __future__ import annotations
 
@@ -11,12 +11,13 @@ import numpy.typing as npt
 from arm_ik_service.body.arm_fit import (
     ARM_FIT,
     ARM_LENGTH_PART,
+    BONES_RANGE,
     ELBOW,
-    FOREARM_PER_STATURE,
+    EXPECTED_FOREARM_PER_STATURE,
+    EXPECTED_UPPER_ARM_PER_STATURE,
     LEAST_ERROR_M,
     SHOULDER,
     UPPER_ARM,
-    UPPER_ARM_PER_STATURE,
     begin,
     expect,
     improve,
@@ -32,10 +33,8 @@ from arm_ik_service.geometry import scalar as g
 Array = npt.NDArray[np.float64]
 
 REACH_PERCENTILE = 99.0
-TRUSTING_STEPS, STEPS = (
-    12,
-    20,
-)  # of Gauss-Newton: first with small errors wherever the arm starts, then with those found
+# of Gauss-Newton: first with small errors, wherever the arm starts, then with those found
+TRUSTING_STEPS, STEPS = 12, 20
 
 
 @dataclass(frozen=True)
@@ -45,6 +44,7 @@ class Arm:
     upper_arm_m: float
     elbow_in_hand: Array  # (3,) [m] in the wrist frame
     shoulder_width_m: float
+    plausible: bool  # whether these are lengths that a person of that stature has
     length_deviation_m: float  # standard deviation of forearm and upper arm together
 
     @property
@@ -77,7 +77,8 @@ def fit_arm(observation: Observation, stature_m: float, *, axis_m: float) -> Arm
     fit = np.zeros(1, ARM_FIT)[0]
     fit["length_part"], fit["axis_m"] = ARM_LENGTH_PART, axis_m
     half_width_m = 0.5 * SHOULDER_WIDTH_PER_STATURE * stature_m
-    expect(fit, UPPER_ARM_PER_STATURE * stature_m, FOREARM_PER_STATURE * stature_m, half_width_m)
+    expected = (EXPECTED_UPPER_ARM_PER_STATURE * stature_m, EXPECTED_FOREARM_PER_STATURE * stature_m)
+    expect(fit, *expected, half_width_m)
     begin(fit)
     _take_all(fit, observation.wrists, observation.seconds / len(observation))
     hands = observation.wrists[..., :3].reshape(-1, 3)
@@ -91,4 +92,7 @@ def fit_arm(observation: Observation, stature_m: float, *, axis_m: float) -> Arm
     elbow = np.array(fit["x"][ELBOW:UPPER_ARM])
     along = np.concatenate([np.zeros(3), elbow / np.linalg.norm(elbow), [1.0]])
     deviation = np.sqrt(along @ np.linalg.solve(fit["normal"], along))
-    return Arm(float(fit["x"][UPPER_ARM]), elbow, 2.0 * float(fit["x"][SHOULDER]), float(deviation))
+    upper_arm, half_width = float(fit["x"][UPPER_ARM]), float(fit["x"][SHOULDER])
+    parts = np.array([upper_arm, np.linalg.norm(elbow), half_width]) / (*expected, half_width_m)
+    plausible = bool((parts > 1.001 * BONES_RANGE[0]).all() and (parts < 0.999 * BONES_RANGE[1]).all())
+    return Arm(upper_arm, elbow, 2.0 * half_width, plausible, float(deviation))

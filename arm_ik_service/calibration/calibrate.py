@@ -71,7 +71,7 @@ def calibrate(frames: np.ndarray[Any, Any], method: Method | None = None, start:
     if len(observation) == 0:
         raise CalibrationError("head and both hands were never tracked together")
     if method == "moving":
-        return _from_movement(frames, start)
+        return _from_movement(frames, observation, start)
     if method is not None:
         return _from_pose(find_pose(observation, method), observation, start)
     poses: tuple[PoseName, ...] = ("t_pose", "a_pose")
@@ -80,7 +80,7 @@ def calibrate(frames: np.ndarray[Any, Any], method: Method | None = None, start:
             return _from_pose(find_pose(observation, name), observation, start)
         except CalibrationError:
             continue
-    return _from_movement(frames, start)
+    return _from_movement(frames, observation, start)
 
 
 def _with_measures(
@@ -162,9 +162,8 @@ def _turned_grip(start: Profile, arm: Arm) -> tuple[Array, float]:
     return batch.multiply(new_from_old, np.asarray(start.grip.right.orientation_xyzw)), angle
 
 
-def _from_movement(frames: np.ndarray[Any, Any], start: Profile) -> Calibration:
+def _from_movement(frames: np.ndarray[Any, Any], observation: Observation, start: Profile) -> Calibration:
     notes, profile = [], start
-    observation = observe(frames, start)
     seconds = observation.seconds
     if seconds < LEAST_MOVING_S:
         raise CalibrationError(
@@ -186,6 +185,11 @@ def _from_movement(frames: np.ndarray[Any, Any], start: Profile) -> Calibration:
         observation = observe(frames, profile)
         arm = fit_arm(observation, stature, axis_m=AXIS_FOUND_M if changed else AXIS_M)
         profile = _with_measures(profile, stature, arm.upper_arm_m, arm.forearm_m, arm.shoulder_width_m)
+    if not arm.plausible:
+        raise CalibrationError(
+            f"these hands do not move as those of somebody {stature:.2f} m tall do: "
+            "is each controller in its own hand, and was everything tracked in one space?"
+        )
     return Calibration(
         profile=profile,
         method="moving",

@@ -151,6 +151,7 @@ def test_whatever_is_seen_the_bones_are_those_of_a_person(
         fit["reach"] = np.linalg.norm([x, y, z])
         improve(fit)
         assert np.isfinite(fit["x"]).all()
-        assert BONES_RANGE[0] <= fit["x"][UPPER_ARM] / UPPER <= BONES_RANGE[1]
+        assert BONES_RANGE[0] - 1e-9 <= fit["x"][UPPER_ARM] / UPPER <= BONES_RANGE[1] + 1e-9
         forearm = np.linalg.norm(fit["x"][ELBOW:UPPER_ARM]) / FORE
         assert BONES_RANGE[0] - 1e-9 <= forearm <= BONES_RANGE[1] + 1e-9
+        assert BONES_RANGE[0] - 1e-9 <= fit["x"][SHOULDER] / HALF <= BONES_RANGE[1] + 1e-9

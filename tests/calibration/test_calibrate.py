@@ -128,3 +128,13 @@ def test_someone_who_is_not_there_or_does_not_move_is_refused() -> None:
         calibrate(standing(2.0).flagged(LEFT, slice(None), 0).frames)
     with pytest.raises(CalibrationError, match="hardly moved"):
         calibrate(standing(5.0).frames, "moving")
+
+
+def test_hands_that_belong_to_nobody_are_refused_and_no_profile_is_made_of_them() -> None:
+    rng = np.random.default_rng(4)
+    take = standing(30.0, 60.0)
+    for device in (LEFT, RIGHT):
+        take.poses[:, device, :3] += np.cumsum(0.02 * rng.normal(size=(len(take.t), 3)), axis=0).clip(-0.4, 0.4)
+        take.poses[:, device, 3:] = batch.normalized(rng.normal(size=(len(take.t), 4)))
+    with pytest.raises(CalibrationError, match="in its own hand"):
+        calibrate(take.frames, "moving")
