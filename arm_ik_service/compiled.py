@@ -109,6 +109,11 @@ def inlined(function: Function) -> Function:
     return function if _as_python() else cast(Function, _Part(function, inline=True))
 
 
+def was_cached(function: Callable[..., Any]) -> bool:
+    """Whether a compiled function that was called had been compiled before: by another process, or an earlier one."""
+    return _as_python() or bool(cast(Any, function).stats.cache_hits)
+
+
 def _as_python() -> bool:
     return bool(cast(Any, numba.config).DISABLE_JIT)
 

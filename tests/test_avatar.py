@@ -117,6 +117,15 @@ def test_a_frame_without_any_device_is_answered_with_finite_numbers_and_says_los
     assert state.left.bones.hand.position[1] > 0.3
 
 
+def go_on(frames: list[ControllerFrame], *several: Avatars) -> None:
+    """Show all of them the same frames again, ten seconds later."""
+    for frame in frames:
+        ns = frame.sample_time_ns + 10_000_000_000
+        for avatars in several:
+            avatars.add(0, msgspec.structs.replace(frame, seq=frame.seq + len(frames), sample_time_ns=ns), ns)
+            avatars.step()
+
+
 def test_whoever_is_taken_over_keeps_the_lengths_that_were_learnt_of_them(frames: list[ControllerFrame]) -> None:
     def tall(pose: TrackedPose | None) -> TrackedPose | None:
         if pose is None:
@@ -144,11 +153,7 @@ def test_whoever_is_taken_over_keeps_the_lengths_that_were_learnt_of_them(frames
         avatars.add(0, seen[-1], seen[-1].sample_time_ns)
         avatars.step()
     np.testing.assert_allclose(second.lengths([0]), first.lengths([0]), atol=5e-3)
-    for frame in seen:
-        ns = frame.sample_time_ns + 10_000_000_000
-        for avatars in (first, second):
-            avatars.add(0, msgspec.structs.replace(frame, seq=frame.seq + len(seen), sample_time_ns=ns), ns)
-            avatars.step()
+    go_on(seen, first, second)
     np.testing.assert_allclose(second.lengths([0]), first.lengths([0]), rtol=0.08)
 
 
@@ -190,9 +195,5 @@ def test_what_a_profile_states_stays_when_the_rest_is_taken_over(
     width_or_stature = 3 if stated.shoulder_width_m else 0
     assert second.lengths([0])[0, width_or_stature] == first.lengths([0])[0, width_or_stature]
     np.testing.assert_allclose(second.lengths([0])[:, 1:3], first.lengths([0])[:, 1:3], atol=1e-9)
-    for frame in frames:
-        ns = frame.sample_time_ns + 10_000_000_000
-        for avatars in (first, second):
-            avatars.add(0, msgspec.structs.replace(frame, seq=frame.seq + len(frames), sample_time_ns=ns), ns)
-            avatars.step()
+    go_on(frames, first, second)
     np.testing.assert_allclose(second.lengths([0])[:, 1:3], first.lengths([0])[:, 1:3], rtol=0.08)

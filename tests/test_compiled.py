@@ -73,3 +73,14 @@ def test_processes_that_start_together_fill_one_cache_and_agree(tmp_path: Path) 
     assert float(heights.pop()) < 0.0
     kept = {path.name.split("-")[0] for path in tmp_path.rglob("*.nbc")}
     assert kept == {"chain.forward_poses"}, "what it is made of is compiled into it, and nothing by itself"
+
+
+def test_a_process_knows_whether_what_it_called_was_compiled_before(tmp_path: Path) -> None:
+    asks = "; from arm_ik_service.arm.chain import forward_poses; from arm_ik_service.compiled import was_cached"
+    program = f"{PROGRAM}{asks}; print(was_cached(forward_poses))"
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    says = [
+        subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, env=environment, check=True)
+        for _ in range(2)
+    ]
+    assert [said.stdout.split()[-1] for said in says] == ["False", "True"]

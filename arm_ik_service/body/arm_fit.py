@@ -23,6 +23,7 @@ from typing import Any
 
 import numpy as np
 
+from arm_ik_service.body.profile import SHOULDER_WIDTH_PER_STATURE
 from arm_ik_service.compiled import Record, compiled, inlined, record_dtype
 from arm_ik_service.geometry import scalar as g
 from arm_ik_service.geometry.scalar import Quaternion, Vector
@@ -32,8 +33,9 @@ from arm_ik_service.geometry.scalar import Quaternion, Vector
 # where, the CMU and Xia recordings say.
 ARM_PER_STATURE = 0.324
 SEGMENTS = 1.2
-EXPECTED_FOREARM_PER_STATURE = ARM_PER_STATURE / (1.0 + SEGMENTS)
-EXPECTED_UPPER_ARM_PER_STATURE = ARM_PER_STATURE - EXPECTED_FOREARM_PER_STATURE
+_FOREARM_PER_STATURE = ARM_PER_STATURE / (1.0 + SEGMENTS)
+_UPPER_ARM_PER_STATURE = ARM_PER_STATURE - _FOREARM_PER_STATURE
+HALF_WIDTH_PER_STATURE = 0.5 * SHOULDER_WIDTH_PER_STATURE
 
 # standard deviations, chosen so that the mocap recordings are as far off as they say
 SHOULDER_M: Vector = (0.015, 0.03, 0.05)  # to the side, up, back: trunks turn and lean into a reach
@@ -97,13 +99,21 @@ def elbow(fit: Record) -> Vector:
 
 
 @inlined
-def expect(fit: Record, upper_arm_m: float, forearm_m: float, half_width_m: float) -> None:
-    """Say what the samples are weighed against: the lengths of an average person of that stature, or known ones."""
-    fit.upper_arm, fit.forearm, fit.half_width = upper_arm_m, forearm_m, half_width_m
+def average(stature_m: float) -> Vector:
+    """Upper arm, forearm and half the shoulders' width [m] of an average person."""
+    return (_UPPER_ARM_PER_STATURE * stature_m, _FOREARM_PER_STATURE * stature_m, HALF_WIDTH_PER_STATURE * stature_m)
 
 
-def begin(fit: Record) -> None:
-    """Forget all samples: the arm is the expected one."""
+@inlined
+def expect(fit: Record, lengths: Vector) -> None:
+    """Say what the samples are weighed against: `average` lengths, or known ones."""
+    fit.upper_arm, fit.forearm, fit.half_width = lengths
+
+
+def begin(fit: Record, expected: Vector, *, length_part: float = ARM_LENGTH_PART, axis_m: float = AXIS_M) -> None:
+    """Forget all samples: the arm is the expected one, as surely as the two standard deviations say."""
+    expect(fit, expected)
+    fit["length_part"], fit["axis_m"] = length_part, axis_m
     fit["moments"] = 0.0
     fit["seconds"] = 0.0
     fit["error_m"] = LEAST_ERROR_M

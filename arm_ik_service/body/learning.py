@@ -13,12 +13,10 @@ import numpy as np
 
 from arm_ik_service.body.arm_fit import (
     ARM_FIT,
-    ARM_LENGTH_PART,
-    AXIS_M,
     BONES_RANGE,
-    EXPECTED_FOREARM_PER_STATURE,
-    EXPECTED_UPPER_ARM_PER_STATURE,
+    HALF_WIDTH_PER_STATURE,
     UPPER_ARM,
+    average,
     begin,
     elbow,
     expect,
@@ -29,12 +27,12 @@ from arm_ik_service.body.arm_fit import (
 )
 from arm_ik_service.body.follow import follow
 from arm_ik_service.body.profile import BodyMeasures, Profile
+from arm_ik_service.body.shoulders import wrist_in_chest
 from arm_ik_service.compiled import Record, compiled, inlined, record_dtype
 from arm_ik_service.geometry import scalar as g
 from arm_ik_service.geometry.scalar import Quaternion, Vector
 
 EYES_PER_STATURE = 0.936  # eye height over stature: Drillis & Contini (1966)
-HALF_WIDTH_PER_STATURE = 0.103
 
 EYES_PERCENTILE = 0.75  # people crouch more than they jump
 EYES_M_S = 0.3  # speed of the estimate at first ...
@@ -74,10 +72,8 @@ def initialise_learning(body: Record, profile: Profile) -> None:
     learning["stature"] = learning["arms"] and measures.stature_m == BodyMeasures().stature_m
     learning["eyes"] = EYES_PER_STATURE * measures.stature_m
     learning["by_stature"] = 1
-    learning["fit"]["length_part"], learning["fit"]["axis_m"] = ARM_LENGTH_PART, AXIS_M
     body["stature"] = measures.stature_m
-    _expect(body)
-    begin(learning["fit"])
+    begin(learning["fit"], _expected(body))
     body["lengths"]["at"] = (measures.upper_arm, measures.forearm, measures.stature_m)
 
 
@@ -90,21 +86,19 @@ def resume_learning(body: Record, upper_arm_m: float, forearm_m: float, half_wid
     if not learning["arms"]:
         return
     stature = half_width_m / HALF_WIDTH_PER_STATURE if learning["width"] and learning["stature"] else body["stature"]
-    expected = (EXPECTED_UPPER_ARM_PER_STATURE, EXPECTED_FOREARM_PER_STATURE, HALF_WIDTH_PER_STATURE)
-    taken = (upper_arm_m, forearm_m, half_width_m if learning["width"] else HALF_WIDTH_PER_STATURE * stature)
+    expected = average(stature)
+    taken = (upper_arm_m, forearm_m, half_width_m if learning["width"] else expected[2])
     lower, upper = BONES_RANGE
-    if not all(lower * e * stature <= t <= upper * e * stature for t, e in zip(taken, expected, strict=True)):
+    if not all(lower * e <= t <= upper * e for t, e in zip(taken, expected, strict=True)):
         return
     if learning["stature"] and not STANDING_EYES_M[0] <= EYES_PER_STATURE * stature <= STANDING_EYES_M[1]:
         return
     learning["watched_s"] = WATCHED_BEFORE_S if learning["width"] else 0.0
     learning["eyes"] = EYES_PER_STATURE * stature
     learning["by_stature"] = 0
-    learning["fit"]["length_part"] = TAKEN_OVER_PART
     if learning["width"]:
         body["half_width"] = half_width_m
-    expect(learning["fit"], upper_arm_m, forearm_m, body["half_width"])
-    begin(learning["fit"])
+    begin(learning["fit"], (upper_arm_m, forearm_m, float(body["half_width"])), length_part=TAKEN_OVER_PART)
     body["stature"] = stature
     body["upper_arm"], body["forearm"], body["arm_length"] = upper_arm_m, forearm_m, upper_arm_m + forearm_m
     body["lengths"]["at"] = (upper_arm_m, forearm_m, stature)
@@ -117,14 +111,13 @@ def _stature(body: Record) -> float:
 
 
 @inlined
-def _expect(body: Record) -> None:
-    """Let the arm's fit expect what the stature says."""
-    learning, stature = body.learning, _stature(body)
-    upper_arm, forearm = learning.fit.upper_arm, learning.fit.forearm
-    if learning.by_stature:
-        upper_arm, forearm = EXPECTED_UPPER_ARM_PER_STATURE * stature, EXPECTED_FOREARM_PER_STATURE * stature
-    half_width = HALF_WIDTH_PER_STATURE * stature if learning.width else body.half_width
-    expect(learning.fit, upper_arm, forearm, half_width)
+def _expected(body: Record) -> Vector:
+    """Upper arm, forearm and half width [m] that are expected: what the stature says, so far as they are not known."""
+    learning = body.learning
+    upper_arm, forearm, half_width = average(_stature(body))
+    if not learning.by_stature:
+        upper_arm, forearm = learning.fit.upper_arm, learning.fit.forearm
+    return (upper_arm, forearm, half_width if learning.width else body.half_width)
 
 
 @compiled
@@ -138,11 +131,8 @@ def _learn_stature(body: Record, eyes_m: float, elapsed_s: float) -> None:
 @inlined
 def _in_chest(body: Record, k: int) -> tuple[Vector, Quaternion]:
     """Wrist of one side in the frame of a chest whose shoulders never settled, a left one mirrored."""
-    chest_from_world = g.conjugate(g.quaternion(body.chest_rotation))
-    wrist = body.wrists[k]
-    hand = g.rotate(chest_from_world, g.subtract(g.vector(wrist.position), g.vector(body.chest_position)))
-    hand = (hand[0], hand[1] - body.settled, hand[2])
-    rotation = g.multiply(chest_from_world, g.quaternion(wrist.rotation))
+    hand = g.subtract(wrist_in_chest(body, k), (0.0, body.settled, 0.0))
+    rotation = g.multiply(g.conjugate(g.quaternion(body.chest_rotation)), g.quaternion(body.wrists[k].rotation))
     return (hand, rotation) if k == 1 else (g.mirror_vector(hand), g.mirror_rotation(rotation))
 
 
@@ -181,7 +171,7 @@ def _learn_arms(body: Record, tracking: Record, elapsed_s: float) -> None:
     if sampled:
         learning.since_sample_s = 0.0
         take(fit, sampled_s[0], sampled_s[1])
-        _expect(body)
+        expect(fit, _expected(body))
         improve(fit)
 
 

@@ -49,12 +49,18 @@ def _shoulder_in_chest(side: float, half_width: float, arm_length: float, wrist:
 
 
 @compiled
+def wrist_in_chest(body: Record, k: int) -> Vector:
+    """Place of the wrist asked for on one side [m], in the chest's frame."""
+    away = g.subtract(g.vector(body.wrists[k].position), g.vector(body.chest_position))
+    return g.rotate(g.conjugate(g.quaternion(body.chest_rotation)), away)
+
+
+@compiled
 def step_shoulder(body: Record, k: int) -> None:
     """Place the shoulder and the clavicle of one side for the wrist in `body.wrists[k]`."""
     side = -1.0 if k == 0 else 1.0
     chest, world_from_chest = g.vector(body.chest_position), g.quaternion(body.chest_rotation)
-    wrist = g.rotate(g.conjugate(world_from_chest), g.subtract(g.vector(body.wrists[k].position), chest))
-    shoulder = _shoulder_in_chest(side, body.half_width, body.arm_length, wrist)
+    shoulder = _shoulder_in_chest(side, body.half_width, body.arm_length, wrist_in_chest(body, k))
     g.store(body.shoulders[k], g.add(chest, g.rotate(world_from_chest, shoulder)))
 
     x, y, z = STERNOCLAVICULAR
@@ -72,9 +78,7 @@ def step_shoulder(body: Record, k: int) -> None:
 def away_from_rest(body: Record, k: int) -> Vector:
     """From where the shoulder of one side rests to the wrist asked for [m], in the chest's axes."""
     side = -body.half_width if k == 0 else body.half_width
-    away = g.subtract(g.vector(body.wrists[k].position), g.vector(body.chest_position))
-    away = g.rotate(g.conjugate(g.quaternion(body.chest_rotation)), away)
-    return g.subtract(away, (side, 0.0, 0.0))
+    return g.subtract(wrist_in_chest(body, k), (side, 0.0, 0.0))
 
 
 @compiled

@@ -10,22 +10,18 @@ import numpy.typing as npt
 
 from arm_ik_service.body.arm_fit import (
     ARM_FIT,
-    ARM_LENGTH_PART,
     BONES_RANGE,
     ELBOW,
-    EXPECTED_FOREARM_PER_STATURE,
-    EXPECTED_UPPER_ARM_PER_STATURE,
     LEAST_ERROR_M,
     SHOULDER,
     UPPER_ARM,
+    average,
     begin,
-    expect,
     improve,
     linearise,
     show,
     take,
 )
-from arm_ik_service.body.profile import SHOULDER_WIDTH_PER_STATURE
 from arm_ik_service.calibration.observation import Observation
 from arm_ik_service.compiled import Record, compiled
 from arm_ik_service.geometry import scalar as g
@@ -75,11 +71,8 @@ def fit_arm(observation: Observation, stature_m: float, *, axis_m: float) -> Arm
     Deterministic. Needs a few hundred frames to mean anything; the deviation says how much it does.
     """
     fit = np.zeros(1, ARM_FIT)[0]
-    fit["length_part"], fit["axis_m"] = ARM_LENGTH_PART, axis_m
-    half_width_m = 0.5 * SHOULDER_WIDTH_PER_STATURE * stature_m
-    expected = (EXPECTED_UPPER_ARM_PER_STATURE * stature_m, EXPECTED_FOREARM_PER_STATURE * stature_m)
-    expect(fit, *expected, half_width_m)
-    begin(fit)
+    expected = average(stature_m)
+    begin(fit, expected, axis_m=axis_m)
     _take_all(fit, observation.wrists, observation.seconds / len(observation))
     hands = observation.wrists[..., :3].reshape(-1, 3)
     for step in range(TRUSTING_STEPS + STEPS):
@@ -93,6 +86,6 @@ def fit_arm(observation: Observation, stature_m: float, *, axis_m: float) -> Arm
     along = np.concatenate([np.zeros(3), elbow / np.linalg.norm(elbow), [1.0]])
     deviation = np.sqrt(along @ np.linalg.solve(fit["normal"], along))
     upper_arm, half_width = float(fit["x"][UPPER_ARM]), float(fit["x"][SHOULDER])
-    parts = np.array([upper_arm, np.linalg.norm(elbow), half_width]) / (*expected, half_width_m)
+    parts = np.array([upper_arm, np.linalg.norm(elbow), half_width]) / expected
     plausible = bool((parts > 1.001 * BONES_RANGE[0]).all() and (parts < 0.999 * BONES_RANGE[1]).all())
     return Arm(upper_arm, elbow, 2.0 * half_width, plausible, float(deviation))

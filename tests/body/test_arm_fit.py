@@ -43,9 +43,7 @@ SECONDS = 4.0  # little enough that every sample counts
 
 def fresh() -> Record:
     fit = np.zeros(1, ARM_FIT)[0]
-    fit["length_part"], fit["axis_m"] = ARM_LENGTH_PART, AXIS_M
-    expect(fit, UPPER, FORE, HALF)
-    begin(fit)
+    begin(fit, (UPPER, FORE, HALF))
     return fit
 
 
@@ -119,7 +117,7 @@ def test_an_arm_whose_wrist_stays_straight_is_found_exactly_where_nothing_else_i
 
 def test_without_samples_it_is_what_is_expected() -> None:
     fit = fresh()
-    expect(fit, 1.1 * UPPER, 1.1 * FORE, 1.1 * HALF)
+    expect(fit, (1.1 * UPPER, 1.1 * FORE, 1.1 * HALF))
     for _ in range(10):
         improve(fit)
     np.testing.assert_allclose(fit["x"], 1.1 * np.array([HALF, 0.0, 0.0, 0.0, 0.0, FORE, UPPER]), atol=1e-9)
